@@ -1,0 +1,42 @@
+// Which instruction set the kernels run on, and on how many threads.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+namespace facetwise {
+
+// Every target gives the same bits for the same inputs.
+enum class Target : std::uint8_t {
+  best = 0,    // the fastest that this CPU has
+  scalar = 1,  // the portable fallback
+  avx2 = 2,
+  avx3 = 3,  // AVX-512
+  neon = 4,
+};
+
+std::string_view name(Target);
+std::optional<Target> parse_target(std::string_view);
+
+// The targets that were compiled in and that this CPU has, best first; never empty.
+std::vector<Target> available_targets();
+
+// The target that runs where `target` is asked for: itself if available, the first of
+// available_targets() for `best`, nothing if this CPU or build lacks it.
+std::optional<Target> resolve(Target target);
+
+// Lanes in one vector of an available target: 16 for avx3, 8 avx2, 4 neon, 1 scalar.
+std::size_t vector_lanes(Target target);
+
+// How a call runs. The defaults are right for everything but tests and benchmarks.
+struct Execution {
+  Target target = Target::best;
+  // Kernels one lane wide on the same target: what the vector width is worth. For benchmarks.
+  bool one_lane = false;
+  // Stay on the calling thread. Otherwise work spreads over the caller's TBB arena.
+  bool single_thread = false;
+};
+
+}  // namespace facetwise

@@ -1,0 +1,32 @@
+// The remote engine: the library's calls, answered by one or more facetwise servers.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "facetwise/engine.h"
+
+namespace facetwise {
+
+struct ConnectOptions {
+  // Lanes of a batch are sent in pieces of about this many bytes (request or response, the larger), several
+  // at a time. Below the server's limit always.
+  std::size_t piece_bytes = std::size_t{1} << 20;
+  // Pieces in flight at once, over all servers.
+  int window = 4;
+  // How long connect() waits for a server, and a call for its answer.
+  std::chrono::milliseconds connect_timeout{5000};
+  std::chrono::milliseconds call_timeout{60000};
+};
+
+// Connects to servers; each address is "unix:PATH" or "HOST:PORT". Pieces of a batch go to them in turn;
+// since every server gives the same bits, it does not matter which answers. Unavailable if one does not
+// answer in time.
+absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> addresses,
+                                                const ConnectOptions& options = {});
+
+}  // namespace facetwise
