@@ -1,0 +1,164 @@
+// The exact reflection sampler: visible normals whose reflection is not occluded, in exact proportion.
+// Derivation: docs/math.md, "The exact reflection sampler"; the symbols are those used there.
+
+#if defined(FACETWISE_EXACT_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_EXACT_INL_H_
+#undef FACETWISE_EXACT_INL_H_
+#else
+#define FACETWISE_EXACT_INL_H_
+#endif
+
+#include "src/kernels/samplers-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+// The smallest o_z, m_hat_z and i.M / lambda that `exact` returns for i_z > 0: rounding puts a few samples in a
+// million on the wrong side of the rim they were drawn inside of, and these are raised to it.
+inline constexpr float kRim = 0x1p-30f;
+
+// The elliptic cone of unoccluded normals, for i_z > 0.
+template <class D>
+struct Cone {
+  using V = Vec<D>;
+  V lambda;                  // the form's positive eigenvalue
+  V inverse_p, inverse_q;    // 1 / (lambda + i_z ax^2), 1 / (lambda + i_z ay^2)
+  V vx, vy;                  // the axis (v_x, v_y, 1)
+  V inverse_n2;              // 1 / v.v
+  V four_k;                  // 4 K = 4 lambda^2 / (n2 sqrt(P Q))
+};
+
+// One Halley step for the root of the cubic (l - i_z) P Q - w_x^2 Q - w_y^2 P, P = l + px, Q = l + py. Its form
+// has one division, where the rational equation it comes from has two.
+template <class D, class V = Vec<D>>
+HWY_INLINE V HalleyStep(D, const Incident<D>& i, V l, V px, V py) {
+  const V p = l + px, q = l + py, e = l - i.z;
+  const V pq = p * q, sum = p + q;
+  const V xx = i.wx * i.wx, yy = i.wy * i.wy;
+  const V f = Fma(e, pq, hn::Neg(Fma(xx, q, yy * p)));
+  const V f1 = Fma(e, sum, pq) - (xx + yy);
+  const V f2_half = sum + e;  // half the second derivative
+  // l - 2 f f' / (2 f'^2 - f f'')
+  return NegFma(f, f1 / Fma(f1, f1, hn::Neg(f * f2_half)), l);
+}
+
+template <class D, class V = Vec<D>>
+HWY_INLINE void MakeCone(D d, const Incident<D>& i, Cone<D>& cone) {
+  const V one = hn::Set(d, 1.0f);
+  const V px = i.z * (i.ax * i.ax);
+  const auto isotropic = i.ax == i.ay;
+  const bool all_isotropic = hn::AllTrue(d, isotropic);
+
+  // lambda for isotropic roughness; otherwise a start from below, with the mean of i_z alpha^2.
+  V py = px, mean = px;
+  if (!all_isotropic) {
+    py = i.z * (i.ay * i.ay);
+    const V xx = i.wx * i.wx, yy = i.wy * i.wy;
+    mean = Select(isotropic, px, Fma(xx, px, yy * py) / i.a);
+  }
+  const V sum = i.z + mean, difference = i.z - mean;
+  const V four_a = (i.a + i.a) + (i.a + i.a);
+  const V root = hn::Sqrt(Fma(sum, sum, four_a));
+  const V half = hn::Set(d, 0.5f);
+  V lambda = half * (difference + root);
+  const auto cancels = difference < hn::Zero(d);
+  if (!hn::AllFalse(d, cancels)) {
+    const V numerator = Fma(i.z, mean, i.a);
+    lambda = Select(cancels, (numerator + numerator) / (root - difference), lambda);
+  }
+  if (!all_isotropic) {
+    // Errors after 1, 2, 3 steps for alpha up to 1, 4, 10 are below 1e-6 (docs/math.md); isotropic lanes have none.
+    const V largest = hn::IfThenElseZero(hn::Not(isotropic), hn::Max(i.ax, i.ay));
+    lambda = Select(isotropic, lambda, HalleyStep(d, i, lambda, px, py));
+    const auto rough = largest > one;
+    if (!hn::AllFalse(d, rough)) {
+      lambda = Select(rough, HalleyStep(d, i, lambda, px, py), lambda);
+      const auto rougher = largest > hn::Set(d, 4.0f);
+      if (!hn::AllFalse(d, rougher)) lambda = Select(rougher, HalleyStep(d, i, lambda, px, py), lambda);
+    }
+  }
+
+  cone.lambda = lambda;
+  cone.inverse_p = one / (lambda + px);
+  V inverse_root = cone.inverse_p;  // 1 / sqrt(P Q); sqrt(x x) is x in IEEE arithmetic
+  cone.inverse_q = cone.inverse_p;
+  if (!all_isotropic) {
+    cone.inverse_q = one / (lambda + py);
+    inverse_root = hn::Sqrt(cone.inverse_p * cone.inverse_q);
+  }
+  cone.vx = i.wx * cone.inverse_p;
+  cone.vy = i.wy * cone.inverse_q;
+  cone.inverse_n2 = one / Fma(cone.vx, cone.vx, Fma(cone.vy, cone.vy, one));
+  const V two_lambda = lambda + lambda;
+  cone.four_k = two_lambda * two_lambda * (cone.inverse_n2 * inverse_root);
+}
+
+struct Exact {
+  static constexpr bool kUnit = false;
+  static constexpr bool kUsesU3 = true;
+  static constexpr bool kVisible = true;
+  static constexpr bool kExact = true;
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V FourN(D d, const Incident<D>& i, V, V) {
+    Cone<D> cone;
+    MakeCone(d, i, cone);
+    return Select(i.z > hn::Zero(d), cone.four_k, FourSigma(i));
+  }
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V u3, Drawn<D>& drawn) {
+    Cone<D> cone;
+    MakeCone(d, i, cone);
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), rim = hn::Set(d, kRim);
+    V sin, cos;
+    SinCosTurn(d, u2, sin, cos);
+
+    // A point (xi, eta) of the ellipse, uniformly; the point of the sphere above it, along the axis v.
+    const V lambda_u = cone.lambda * u1;
+    const V rp = hn::Sqrt(lambda_u * cone.inverse_p);
+    V rq = rp;
+    if (!hn::AllTrue(d, i.ax == i.ay)) rq = hn::Sqrt(lambda_u * cone.inverse_q);
+    const V xi = rp * cos, eta = rq * sin;
+    const V along = Fma(xi, cone.vx, eta * cone.vy);
+    const V y = hn::Neg(along * cone.inverse_n2);
+    // zeta^2 v.v = 1 - xi^2 - eta^2 + along^2 / v.v. At the rim 1 - xi^2 - eta^2 cancels; by 1 - lambda / P =
+    // i_z ax^2 / P it is a sum of positive terms: (1 - u1) lambda X + i_z (ax^2 cos^2 / P + ay^2 sin^2 / Q),
+    // X = cos^2 / P + sin^2 / Q.
+    const V cp = cos * cos * cone.inverse_p, sq = sin * sin * cone.inverse_q;
+    const V inside = Fma((one - u1) * cone.lambda, cp + sq, i.z * Fma(i.ax * i.ax, cp, i.ay * i.ay * sq));
+    const V zeta = hn::Sqrt(Fma(y, y, inside * cone.inverse_n2));
+
+    // The sample or its mirror image about the axis, in proportion to w.m_hat.
+    const V across = Fma(xi, i.wx, eta * i.wy);
+    const V g_zeta = cone.lambda * zeta;
+    const V threshold = Fma(cone.lambda, y, across) + g_zeta;
+    const auto mirrored = hn::Not(u3 * (g_zeta + g_zeta) < threshold);
+    const V sign = hn::IfThenElseZero(mirrored, hn::SignBit(d));
+    const V hz = hn::Max(zeta + hn::Xor(y, sign), rim);
+    const V hx = Fma(hz, cone.vx, hn::Xor(xi, sign)), hy = Fma(hz, cone.vy, hn::Xor(eta, sign));
+    Unstretch(i, hx, hy, hz, drawn);
+    drawn.im = hn::Max(Fma(hz, cone.lambda, hn::Xor(across, sign)), rim * cone.lambda);
+    drawn.four_n = cone.four_k;
+
+    // Behind, nothing is occluded: the cap.
+    const auto front = i.z > zero;
+    if (!hn::AllTrue(d, front)) {
+      Drawn<D> cap;
+      Cap::Draw(d, i, u1, u2, u3, cap);
+      drawn.mx = Select(front, drawn.mx, cap.mx);
+      drawn.my = Select(front, drawn.my, cap.my);
+      drawn.mz = Select(front, drawn.mz, cap.mz);
+      drawn.mm = Select(front, drawn.mm, cap.mm);
+      drawn.im = Select(front, drawn.im, cap.im);
+      drawn.four_n = Select(front, drawn.four_n, cap.four_n);
+    }
+  }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
+
+#endif

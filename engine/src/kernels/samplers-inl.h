@@ -1,0 +1,212 @@
+// The published samplers: ndf, heitz, cap, bounded. `exact` has its own file.
+//
+// A sampler draws m ~ M (any length) from m_hat in the stretched frame, M = (ax m_hat_x, ay m_hat_y, m_hat_z),
+// and says by what N the density is normalised: p(o) = D(m) / (4 N). For visible normals N = sigma(i). Its
+// traits:
+//   kUnit       m_hat is of unit length; else it is a half vector w + nu o_hat, so that |m_hat|^2 = 2 i.M
+//   kVisible    i.m > 0 always
+//   kUsesU3     u3 is read
+//   kExact      for i_z > 0 no reflection is occluded; m_hat is of unit length there, else a half vector
+
+#if defined(FACETWISE_SAMPLERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_SAMPLERS_INL_H_
+#undef FACETWISE_SAMPLERS_INL_H_
+#else
+#define FACETWISE_SAMPLERS_INL_H_
+#endif
+
+#include "src/kernels/ggx-inl.h"
+#include "src/math/sincos-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+template <class D>
+struct Drawn {
+  using V = Vec<D>;
+  V mx, my, mz;  // M
+  V mm;          // M . M
+  V im;          // i . M = w . m_hat
+  V four_n;      // 4 N
+};
+
+// Fills in M and M.M from m_hat.
+template <class D, class V = Vec<D>>
+HWY_INLINE void Unstretch(const Incident<D>& i, V hx, V hy, V hz, Drawn<D>& drawn) {
+  drawn.mx = i.ax * hx;
+  drawn.my = i.ay * hy;
+  drawn.mz = hz;
+  drawn.mm = Dot(drawn.mx, drawn.my, drawn.mz, drawn.mx, drawn.my, drawn.mz);
+}
+
+// 4 sigma(i): what normalises heitz and cap.
+template <class D, class V = Vec<D>>
+HWY_INLINE V FourSigma(const Incident<D>& i) {
+  return i.t + i.t;
+}
+
+// Normals with density D(m) m_z (Walter 2007, Eqs. 35, 36): p(o) = D(m) m_z / (4 |i.m|).
+struct Ndf {
+  static constexpr bool kUnit = true;
+  static constexpr bool kUsesU3 = false;
+  static constexpr bool kVisible = false;
+  static constexpr bool kExact = false;
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V FourN(D, const Incident<D>&, V im, V mz) {
+    const V four_im = (im + im) + (im + im);
+    return four_im / mz;
+  }
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+    V sin, cos;
+    SinCosTurn(d, u2, sin, cos);
+    const V r = hn::Sqrt(u1);
+    const V hx = r * cos, hy = r * sin, hz = hn::Sqrt(hn::Set(d, 1.0f) - u1);
+    Unstretch(i, hx, hy, hz, drawn);
+    drawn.im = Dot(i.wx, i.wy, i.z, hx, hy, hz);
+    drawn.four_n = FourN(d, i, drawn.im, drawn.mz);
+  }
+};
+
+// Visible normals by the projected hemisphere: Heitz 2018. With e = w_xy / |w_xy|, s = (1 + c) / 2:
+//   m_hat = t1 (-e_y, e_x, 0) + t2 (-c e_x, -c e_y, s_hat) + t_w w / nu,
+//   t1 = r cos phi,  R^2 = 1 - t1^2,  t2 = R - s (R - r sin phi),  t_w^2 = R^2 - t2^2.
+// R - r sin phi and R + r sin phi have the product 1 - u1, so that neither needs to cancel; with
+// b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (2R - s b).
+struct Heitz {
+  static constexpr bool kUnit = true;
+  static constexpr bool kUsesU3 = false;
+  static constexpr bool kVisible = true;
+  static constexpr bool kExact = false;
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V FourN(D, const Incident<D>& i, V, V) {
+    return FourSigma(i);
+  }
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+    V sin, cos;
+    SinCosTurn(d, u2, sin, cos);
+
+    // Straight up or down e is (1, 0).
+    const V horizontal = hn::Sqrt(Fma(i.wx, i.wx, i.wy * i.wy));
+    const auto vertical = horizontal < hn::Set(d, 1e-15f);
+    const V scale = one / Select(vertical, one, horizontal);
+    const V ex = Select(vertical, one, i.wx * scale), ey = Select(vertical, zero, i.wy * scale);
+    const V inverse_nu = one / i.nu;
+    const V c = i.z * inverse_nu, s_hat = horizontal * inverse_nu;
+    const V s = half * i.t * inverse_nu;
+
+    const V r = hn::Sqrt(u1);
+    const V t1 = r * cos, radial = r * sin;
+    const V rest = one - u1;
+    const V big_r = hn::Sqrt(hn::Max((one - t1) * (one + t1), rest));
+    const V larger = big_r + hn::Abs(radial), smaller = rest / larger;
+    const auto upper = radial > zero;
+    const V b = Select(upper, smaller, larger), p = Select(upper, larger, smaller);
+    const V t2 = NegFma(s, b, big_r);
+    const V tw = hn::Sqrt(s * b * NegFma(s, b, big_r + big_r));
+
+    const V radial_xy = Fma(tw, s_hat, hn::Neg(t2 * c));
+    const V hx = Fma(radial_xy, ex, hn::Neg(t1 * ey)), hy = Fma(radial_xy, ey, t1 * ex);
+    // m_hat_z = t2 s_hat + t_w c; behind it cancels, and is s p (2R - s (2R + b)) / (t2 s_hat + t_w |c|).
+    const V sum = Fma(t2, s_hat, tw * hn::Abs(c));
+    V hz = sum;
+    const auto behind = c < zero;
+    if (!hn::AllFalse(d, behind)) {
+      const V two_r = big_r + big_r;
+      hz = Select(behind, s * p * NegFma(s, two_r + b, two_r) / sum, hz);
+    }
+    Unstretch(i, hx, hy, hz, drawn);
+    drawn.im = i.nu * tw;
+    drawn.four_n = FourSigma(i);
+  }
+};
+
+// A point of the spherical cap o_hat_z in (1 - t / nu, 1], and m_hat = (i_hat + o_hat) nu. Everything is kept
+// nu times as large, so that nothing has to be divided by nu. `above` is what the cap leaves out of the
+// visible one: nu + i_z - t.
+template <class D, class V = Vec<D>>
+HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2, Drawn<D>& drawn) {
+  V sin, cos;
+  SinCosTurn(d, u2, sin, cos);
+  const V height = t * u1;  // nu (1 - o_hat_z)
+  const V radius = hn::Sqrt(height * (i.nu + i.nu - height));
+  const V hx = Fma(radius, cos, i.wx), hy = Fma(radius, sin, i.wy);
+  const V hz = Fma(t, hn::Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
+  Unstretch(i, hx, hy, hz, drawn);
+  drawn.im = Dot(hx, hy, hz, hx, hy, hz) * hn::Set(d, 0.5f);  // w.m_hat = |m_hat|^2 / 2: a half vector
+  drawn.four_n = t + t;
+}
+
+// Visible normals by a spherical cap: Dupuy & Benyoub 2023.
+struct Cap {
+  static constexpr bool kUnit = false;
+  static constexpr bool kUsesU3 = false;
+  static constexpr bool kVisible = true;
+  static constexpr bool kExact = false;
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V FourN(D, const Incident<D>& i, V, V) {
+    return FourSigma(i);
+  }
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+    DrawFromCap(d, i, i.t, hn::Zero(d), u1, u2, drawn);
+  }
+};
+
+// Reflections by a smaller cap: Eto & Tokuyoshi 2023. For i_z > 0 the cap ends at -k c,
+//   k = (1 - a^2) s^2 / (s^2 + a^2 i_z^2),  s = 1 + sgn(1 - a) sin(theta)                          (Eq. 5)
+// with a = alpha where it is isotropic, else min(alpha_x, alpha_y, 1) (Eq. 6). With S = 1 + sin(theta) and
+// 1 - sin(theta) = i_z^2 / S both signs have the same form: S^2 and i_z^2 change places. Likewise
+// 1 - k = a^2 (S^2 + i_z^2) / (the same denominator).
+struct Bounded {
+  static constexpr bool kUnit = false;
+  static constexpr bool kUsesU3 = false;
+  static constexpr bool kVisible = true;
+  static constexpr bool kExact = false;
+
+  // t: nu + k i_z. above: (1 - k) i_z.
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE void Bound(D d, const Incident<D>& i, V& t, V& above) {
+    const V one = hn::Set(d, 1.0f);
+    const V a = Select(i.ax == i.ay, i.ax, hn::Min(hn::Min(i.ax, i.ay), one));
+    const V a2 = a * a, z2 = i.z * i.z;
+    const V sum = one + hn::Sqrt(Fma(i.x, i.x, i.y * i.y));
+    const V sum2 = sum * sum;
+    const auto rough = a > one;
+    const V p = Select(rough, z2, sum2), q = Select(rough, sum2, z2);
+    const V scale = i.z / Fma(a2, q, p);
+    const auto front = i.z > hn::Zero(d);
+    // 1 - a^2 as (1 - a)(1 + a): no cancellation near 1.
+    t = Select(front, Fma((one - a) * (one + a) * p, scale, i.nu), i.t);
+    above = hn::IfThenElseZero(front, a2 * (sum2 + z2) * scale);
+  }
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V FourN(D d, const Incident<D>& i, V, V) {
+    V t, above;
+    Bound(d, i, t, above);
+    return t + t;
+  }
+
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+    V t, above;
+    Bound(d, i, t, above);
+    DrawFromCap(d, i, t, above, u1, u2, drawn);
+  }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,89 @@
+// Names of the vocabulary's values, as used in flags, JSON and messages.
+#include <array>
+#include <utility>
+
+#include "facetwise/batch.h"
+#include "facetwise/model.h"
+#include "facetwise/target.h"
+
+namespace facetwise {
+namespace {
+
+template <class T>
+struct Named {
+  T value;
+  std::string_view name;
+};
+
+constexpr Named<Distribution> kDistributions[] = {{Distribution::ggx, "ggx"}};
+constexpr Named<Masking> kMaskings[] = {{Masking::smith, "smith"}};
+constexpr Named<Shadowing> kShadowings[] = {{Shadowing::correlated, "correlated"},
+                                            {Shadowing::uncorrelated, "uncorrelated"}};
+// The first name of a value is the one that is printed.
+constexpr Named<Sampler> kSamplers[] = {{Sampler::ndf, "ndf"},         {Sampler::heitz, "heitz"},
+                                        {Sampler::cap, "cap"},         {Sampler::bounded, "bounded"},
+                                        {Sampler::exact, "exact"},     {Sampler::cap, "visible"}};
+constexpr Named<LaneStatus> kStatuses[] = {{LaneStatus::accepted, "accepted"},
+                                           {LaneStatus::occluded, "occluded"},
+                                           {LaneStatus::smooth, "smooth"},
+                                           {LaneStatus::invalid, "invalid"}};
+constexpr Named<Target> kTargets[] = {{Target::best, "best"},
+                                      {Target::scalar, "scalar"},
+                                      {Target::avx2, "avx2"},
+                                      {Target::avx3, "avx3"},
+                                      {Target::neon, "neon"}};
+constexpr Named<Operation> kOperations[] = {{Operation::sample_normal, "sample_normal"},
+                                            {Operation::sample_reflection, "sample_reflection"},
+                                            {Operation::pdf_reflection, "pdf_reflection"},
+                                            {Operation::evaluate_reflection, "evaluate_reflection"},
+                                            {Operation::evaluate_and_pdf, "evaluate_and_pdf"},
+                                            {Operation::masking, "masking"}};
+
+template <class T, std::size_t n>
+std::string_view name_in(const Named<T> (&table)[n], T value) {
+  for (const auto& row : table)
+    if (row.value == value) return row.name;
+  return "unknown";
+}
+
+template <class T, std::size_t n>
+std::optional<T> parse_in(const Named<T> (&table)[n], std::string_view text) {
+  for (const auto& row : table)
+    if (row.name == text) return row.value;
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view name(Distribution value) { return name_in(kDistributions, value); }
+std::string_view name(Masking value) { return name_in(kMaskings, value); }
+std::string_view name(Shadowing value) { return name_in(kShadowings, value); }
+std::string_view name(Sampler value) { return name_in(kSamplers, value); }
+std::string_view name(LaneStatus value) { return name_in(kStatuses, value); }
+std::string_view name(Target value) { return name_in(kTargets, value); }
+std::string_view name(Operation value) { return name_in(kOperations, value); }
+
+std::optional<Distribution> parse_distribution(std::string_view text) { return parse_in(kDistributions, text); }
+std::optional<Masking> parse_masking(std::string_view text) { return parse_in(kMaskings, text); }
+std::optional<Shadowing> parse_shadowing(std::string_view text) { return parse_in(kShadowings, text); }
+std::optional<Sampler> parse_sampler(std::string_view text) { return parse_in(kSamplers, text); }
+std::optional<Target> parse_target(std::string_view text) { return parse_in(kTargets, text); }
+std::optional<Operation> parse_operation(std::string_view text) { return parse_in(kOperations, text); }
+
+std::span<const Sampler> all_samplers() {
+  static constexpr std::array kAll = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded,
+                                      Sampler::exact};
+  return kAll;
+}
+
+std::span<const Operation> all_operations() {
+  static constexpr std::array kAll = {Operation::sample_normal,       Operation::sample_reflection,
+                                      Operation::pdf_reflection,      Operation::evaluate_reflection,
+                                      Operation::evaluate_and_pdf,    Operation::masking};
+  return kAll;
+}
+
+bool samples_normals(Sampler sampler) { return sampler <= Sampler::cap; }
+bool uses_u3(Sampler sampler) { return sampler == Sampler::exact; }
+
+}  // namespace facetwise

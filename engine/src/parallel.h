@@ -1,0 +1,32 @@
+// How a call's lanes spread over threads.
+#pragma once
+
+#include <cstddef>
+
+#include "facetwise/target.h"
+#include "tbb/blocked_range.h"
+#include "tbb/parallel_for.h"
+
+namespace facetwise {
+
+// Below this many lanes (some microseconds) a call stays on its thread; above, ranges are at least half of it.
+inline constexpr std::size_t kGrain = 8192;
+
+// Calls body(begin, end) on ranges that make up [0, positions), in the caller's TBB arena. Ranges begin at
+// multiples of 16 lanes, the widest vector.
+template <class Body>
+void for_each_range(std::size_t positions, const Execution& execution, const Body& body) {
+  if (positions == 0) return;
+  if (execution.single_thread || positions <= kGrain) {
+    body(std::size_t{0}, positions);
+    return;
+  }
+  constexpr std::size_t kUnit = 1024;
+  const std::size_t units = (positions + kUnit - 1) / kUnit;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, units, kGrain / kUnit), [&](const auto& range) {
+    const std::size_t end = range.end() * kUnit;
+    body(range.begin() * kUnit, end < positions ? end : positions);
+  });
+}
+
+}  // namespace facetwise

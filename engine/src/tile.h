@@ -1,0 +1,66 @@
+// What a kernel sees: pointers to contiguous lanes. Strides, active lists, one-value columns and generated
+// numbers are resolved before (batch.cc), so that kernels know nothing of them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "facetwise/batch.h"
+#include "facetwise/target.h"
+
+namespace facetwise {
+
+// Indices of a tile's columns: the order of input_fields() and output_fields().
+enum InputIndex { kIx, kIy, kIz, kAlphaX, kAlphaY, kOx, kOy, kOz, kU1, kU2, kU3, kInputs };
+enum OutputIndex {
+  kOutOx, kOutOy, kOutOz, kOutMx, kOutMy, kOutMz, kOutIm, kOutPdf, kOutWeight, kOutValue, kOutMasking,
+  kOutArea, kOutShare, kOutputs
+};
+
+// The widest vector of any target, in lanes. Every buffer of a tile may be read and written up to the next
+// multiple of it.
+inline constexpr std::size_t kWidest = 16;
+
+struct Tile {
+  struct Input {
+    const float* data;
+    std::size_t lane_mask;  // lane & lane_mask indexes data: all ones, or 0 for kWidest equal values
+  };
+  std::size_t lanes = 0;
+  Input in[kInputs] = {};
+  float* out[kOutputs] = {};       // null: not wanted
+  std::uint8_t* status = nullptr;  // null: not wanted
+  bool uncorrelated = false;       // Shadowing::uncorrelated
+};
+
+// Adds the tile's lanes to the statistics.
+using Kernel = void (*)(const Tile& tile, Statistics& statistics);
+
+// Philox words of `lanes` lanes as uniform numbers; u[k] may be null. Ids are first_id + lane, or those of
+// the halves id_low, id_high where these are given.
+struct PhiloxTile {
+  std::size_t lanes = 0;
+  std::uint64_t seed = 0;
+  std::uint32_t dimension = 0;
+  std::uint64_t first_id = 0;
+  const std::uint32_t* id_low = nullptr;
+  const std::uint32_t* id_high = nullptr;
+  float* u[3] = {};
+};
+
+// One target's kernels. Samplers are indexed by Sampler; entries that do not exist are null.
+struct KernelTable {
+  Kernel sample_normal[5];
+  Kernel sample_reflection[5];
+  Kernel pdf_reflection[5];
+  Kernel evaluate_reflection;
+  Kernel evaluate_and_pdf[5];
+  Kernel masking;
+  void (*philox)(const PhiloxTile& tile);
+  std::size_t vector_lanes;
+};
+
+// The kernels of an available target (target.h), full vectors or one lane wide.
+const KernelTable& kernels(Target target, bool one_lane);
+
+}  // namespace facetwise
