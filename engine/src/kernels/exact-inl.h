@@ -139,7 +139,7 @@ struct Exact {
     const V hz = hn::Max(zeta + hn::Xor(y, sign), rim);
     const V hx = Fma(hz, cone.vx, hn::Xor(xi, sign)), hy = Fma(hz, cone.vy, hn::Xor(eta, sign));
     Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = hn::Max(Fma(hz, cone.lambda, hn::Xor(across, sign)), rim * cone.lambda);
+    drawn.im = hn::Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), rim * cone.lambda);
     drawn.four_n = cone.four_k;
 
     // Behind, nothing is occluded: the cap.

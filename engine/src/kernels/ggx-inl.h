@@ -52,13 +52,13 @@ HWY_INLINE Incident<D> Prepare(D d, V x, V y, V z, V ax, V ay) {
   return i;
 }
 
-// D(m) = q^2 / (pi ax ay) for the half vector m ~ h; returns q = |h|^2 ax ay / ((h_x ay)^2 + (h_y ax)^2 +
+// D(m) = q^2 / (pi ax ay) for the half vector m ~ h; returns q = |h|^2 (ax ay)^2 / ((h_x ay)^2 + (h_y ax)^2 +
 // (h_z ax ay)^2). Needs |h|^2 above 2^-40, where nothing underflows.
 template <class V>
 HWY_INLINE V DensityRoot(V hx, V hy, V hz, V h2, V ax, V ay) {
   const V axy = ax * ay;
   const V x = hx * ay, y = hy * ax, z = hz * axy;
-  return h2 * axy / Dot(x, y, z, x, y, z);
+  return h2 * (axy * axy) / Dot(x, y, z, x, y, z);
 }
 
 // w = f cos(theta_o) / pdf_visible(o), as numerator and denominator, for o_z > 0. With A_o and T_o the same

@@ -22,6 +22,9 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
+// i.M of visible normals is kept above this, where rounding could make it 0 or negative.
+inline constexpr float kSmallestIm = 0x1p-100f;
+
 template <class D>
 struct Drawn {
   using V = Vec<D>;
@@ -140,7 +143,8 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   const V hx = Fma(radius, cos, i.wx), hy = Fma(radius, sin, i.wy);
   const V hz = Fma(t, hn::Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
   Unstretch(i, hx, hy, hz, drawn);
-  drawn.im = Dot(hx, hy, hz, hx, hy, hz) * hn::Set(d, 0.5f);  // w.m_hat = |m_hat|^2 / 2: a half vector
+  // Equal to |m_hat|^2 / 2, but this keeps o of unit length where m_hat is short and its rounding counts.
+  drawn.im = hn::Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), hn::Set(d, kSmallestIm));
   drawn.four_n = t + t;
 }
 
