@@ -1,0 +1,35 @@
+// A batch call on files: a table's columns are the lanes' inputs and outputs.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "app/table/table.h"
+#include "facetwise/engine.h"
+
+namespace facetwise::app {
+
+struct FileCall {
+  Operation operation = Operation::sample_reflection;
+  Model model;
+  Sampler sampler = Sampler::exact;
+  std::vector<float> alpha;           // alpha_x, and alpha_y if it differs, for all lanes; else columns
+  std::optional<std::uint64_t> seed;  // of the generator; else columns u1, u2, u3
+  std::uint64_t first_id = 0;
+  std::string input = "-", output = "-";
+};
+
+struct FileCallResult {
+  Statistics statistics;
+  std::vector<std::string> ignored;  // columns that facetwise knows and this call does not read
+  double seconds = 0;                // of the call, without reading and writing
+};
+
+// Reads the input, runs the call and writes the output: all of it or, on an error, nothing.
+absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine);
+
+}  // namespace facetwise::app

@@ -1,0 +1,140 @@
+// sample, pdf, evaluate: the library's calls on files.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "app/arguments.h"
+#include "app/file_call.h"
+#include "app/verbs.h"
+
+namespace facetwise::app {
+namespace {
+
+constexpr const char* kFiles = R"(Files are .csv, .npy, or "-" for CSV through standard input and output.
+CSV: a header line with the columns' names, then one line per lane.
+.npy: a one-dimensional structured array whose fields are little-endian float32 ('<f4').
+  ix iy iz         incident direction, a unit vector in the local frame that points away from the surface
+  alpha_x alpha_y  roughness: the distribution's own parameter, 1e-4 to 10 (or --alpha)
+)";
+constexpr const char* kRandomColumns =
+    "  u1 u2 u3         uniform numbers in [0, 1); u3 for the sampler exact alone (or --seed)\n";
+constexpr const char* kQueryColumns = "  ox oy oz         outgoing direction\n";
+constexpr const char* kStatus = R"(  status           0 accepted, 1 occluded, 2 smooth (alpha below 1e-4), 3 invalid (NaN, not a unit
+                   vector, ...); such lanes are no error and are counted on standard error
+)";
+
+struct FileVerb {
+  FileCall call;
+  EngineArguments engine;
+  std::optional<Sampler> sampler;
+  bool normals = false;
+  bool json = false;
+};
+
+void report(const std::string& verb, const FileVerb& verb_arguments, const FileCallResult& result) {
+  const FileCall& call = verb_arguments.call;
+  const Statistics& s = result.statistics;
+  if (verb_arguments.json) {
+    const nlohmann::ordered_json json = {{"operation", name(call.operation)},
+                                         {"sampler", name(call.sampler)},
+                                         {"engine", verb_arguments.engine.shown()},
+                                         {"lanes", s.lanes()},
+                                         {"accepted", s.accepted},
+                                         {"occluded", s.occluded},
+                                         {"smooth", s.smooth},
+                                         {"invalid", s.invalid},
+                                         {"seconds", result.seconds},
+                                         {"ignored_columns", result.ignored}};
+    fmt::print(stderr, "{}\n", json.dump());
+    return;
+  }
+  fmt::print(stderr, "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
+             verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(call.sampler),
+             verb_arguments.engine.shown(), 1e3 * result.seconds);
+  if (!result.ignored.empty())
+    fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
+}
+
+Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, const std::string& about,
+                   const std::string& columns) {
+  auto arguments = std::make_shared<FileVerb>();
+  FileCall& call = arguments->call;
+  call.operation = operation;
+  CLI::App& command = *app.add_subcommand(verb, about);
+  command.footer(columns);
+  command.add_option("-i,--input", call.input, "File with one lane per row; default -")->type_name("FILE");
+  command.add_option("-o,--output", call.output,
+                     "File to write; default -. It appears when it is complete")->type_name("FILE");
+  add_model(command, call.model);
+  add_named(command, "--sampler", arguments->sampler, parse_sampler,
+            operation == Operation::sample_reflection ? "How directions are drawn; default exact (cap with --normals)"
+                                                      : "The sampler whose pdf is meant; default exact",
+            kSamplerNames);
+  command.add_option("--alpha", call.alpha, "Roughness of all lanes: alpha_x and, if it differs, alpha_y")
+      ->expected(1, 2)
+      ->type_name("X [Y]");
+  if (operation == Operation::sample_reflection) {
+    command.add_flag("--normals", arguments->normals, "Sample microfacet normals instead of reflections");
+    auto* seed = command.add_option("--seed", call.seed, "Seed of the generator of u1 u2 u3")->type_name("N");
+    command.add_option("--first-id", call.first_id, "The first lane's id in the generator; default 0")
+        ->needs(seed)
+        ->type_name("N");
+  }
+  arguments->engine.add_remote(command);
+  arguments->engine.add_target(command);
+  command.add_flag("--json", arguments->json, "Counts of lanes as JSON (on standard error)");
+  return {&command, [arguments, verb] {
+            FileCall& call = arguments->call;
+            if (arguments->normals) call.operation = Operation::sample_normal;
+            call.sampler = arguments->sampler.value_or(arguments->normals ? Sampler::cap : Sampler::exact);
+            auto engine = arguments->engine.open();
+            if (!engine.ok()) return fail(verb, engine.status());
+            const auto result = run_on_files(call, **engine);
+            if (!result.ok()) return fail(verb, result.status());
+            report(verb, *arguments, *result);
+            return kDone;
+          }};
+}
+
+}  // namespace
+
+Verb add_sample(CLI::App& app) {
+  return add_file_verb(app, "sample", Operation::sample_reflection,
+                       "Sample reflections, or microfacet normals, for the incident directions of a file",
+                       std::string(kFiles) + kRandomColumns + R"(Written:
+  ox oy oz         the reflection (not with --normals)
+  mx my mz         the microfacet normal
+  pdf              density per steradian: of the reflection, with --normals of the normal
+  weight           f cos(theta_o) / pdf with F = 1 (not with --normals)
+)" + kStatus + R"(
+Examples:
+  facetwise sample --sampler exact --seed 1 --input rays.csv --output samples.csv
+  facetwise sample --sampler bounded --seed 1 --alpha 0.8 0.1 --input rays.npy --output samples.npy
+  printf 'ix,iy,iz,u1,u2\n0,0,1,0.25,0.5\n' | facetwise sample --normals --alpha 0.3)");
+}
+
+Verb add_pdf(CLI::App& app) {
+  return add_file_verb(app, "pdf", Operation::pdf_reflection,
+                       "Density of a sampler at outgoing directions of a file",
+                       std::string(kFiles) + kQueryColumns + R"(Written:
+  pdf              density per steradian with which the sampler draws the outgoing direction
+)" + kStatus + R"(
+Example:
+  facetwise pdf --sampler exact --alpha 0.3 --input pairs.csv --output pdf.csv)");
+}
+
+Verb add_evaluate(CLI::App& app) {
+  return add_file_verb(app, "evaluate", Operation::evaluate_and_pdf,
+                       "Values f cos(theta_o), and a sampler's density, at outgoing directions of a file",
+                       std::string(kFiles) + kQueryColumns + R"(Written:
+  pdf              density per steradian with which the sampler draws the outgoing direction
+  value            f cos(theta_o) with F = 1, per steradian
+)" + kStatus + R"(
+Example:
+  facetwise evaluate --shadowing uncorrelated --alpha 0.3 --input pairs.csv --output values.csv)");
+}
+
+}  // namespace facetwise::app

@@ -1,0 +1,128 @@
+// summary: what run.sh ends with, from the JSON that bench and verify wrote.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include "app/arguments.h"
+#include "app/errors.h"
+#include "app/verbs.h"
+
+namespace facetwise::app {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::array kImplementations = {"scalar", "one-lane", "simd", "simd-threads", "remote"};
+enum Implementation { kScalar, kOneLane, kSimd, kThreads, kRemote, kCount };
+
+absl::StatusOr<Json> read_json(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) return invalid("{}: cannot read", path);
+  Json json = Json::parse(file, nullptr, false);
+  if (json.is_discarded()) return invalid("{}: not JSON", path);
+  return json;
+}
+
+// The rates of one operation, sampler and roughness; each implementation at its best batch size.
+struct Row {
+  std::array<double, kCount> rate{};  // samples per second, 0 if not measured
+  int measured() const { return static_cast<int>(std::count_if(rate.begin(), rate.end(), [](double r) { return r > 0; })); }
+};
+
+std::string millions(double rate) { return rate > 0 ? fmt::format("{:.1f}", 1e-6 * rate) : "-"; }
+std::string ratio(double a, double b) { return a > 0 && b > 0 ? fmt::format("{:.2f}", a / b) : "-"; }
+
+struct Table {
+  // By operation and sampler, then by roughness.
+  std::map<std::pair<std::string, std::string>, std::map<std::pair<double, double>, Row>> rows;
+
+  explicit Table(const Json& report) {
+    for (const Json& result : report.at("results")) {
+      const auto found = std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
+      if (found == kImplementations.end()) continue;
+      const Json& alpha = result.at("alpha");
+      Row& row = rows[{result.at("operation"), result.at("sampler")}][{alpha.at(0), alpha.at(1)}];
+      double& rate = row.rate[static_cast<std::size_t>(found - kImplementations.begin())];
+      rate = std::max(rate, result.at("samples_per_second").get<double>());
+    }
+  }
+
+  void print() const {
+    fmt::print("\nThroughput, million samples a second, each at its best batch size\n");
+    fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", "operation", "sampler", "alpha",
+               "scalar", "one lane", "SIMD", "threads", "remote", "SIMD/scalar", "threads/SIMD", "remote/SIMD");
+    for (const auto& [what, by_alpha] : rows) {
+      // The roughness that most implementations were measured at.
+      const auto best = std::max_element(by_alpha.begin(), by_alpha.end(), [](const auto& a, const auto& b) {
+        return a.second.measured() < b.second.measured();
+      });
+      const auto& [alpha, row] = *best;
+      fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", what.first, what.second,
+                 fmt::format("{}, {}", alpha.first, alpha.second), millions(row.rate[kScalar]), millions(row.rate[kOneLane]),
+                 millions(row.rate[kSimd]), millions(row.rate[kThreads]), millions(row.rate[kRemote]),
+                 ratio(row.rate[kSimd], row.rate[kScalar]), ratio(row.rate[kThreads], row.rate[kSimd]),
+                 ratio(row.rate[kRemote], row.rate[kSimd]));
+    }
+  }
+};
+
+void print_verification(const Json& verification) {
+  const auto count = [&](const char* key) { return verification.at(key).get<std::uint64_t>(); };
+  const auto percent = [](std::uint64_t part, std::uint64_t whole) {
+    return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
+  };
+  fmt::print("\nReal input\n");
+  fmt::print("  mesh {}: {} triangles\n", verification.at("mesh").get<std::string>(), count("triangles"));
+  fmt::print("  {} rays, {:.1f} % hit; {} lanes, {:.1f} % backfacing\n", count("rays"), percent(count("hits"), count("rays")),
+             count("lanes"), percent(count("backfacing"), count("lanes")));
+  fmt::print("  server against this process: {} bytes, {}\n", count("bytes_compared"),
+             verification.at("equal").get<bool>() ? "every one equal" : "DIFFERENT");
+  fmt::print("\nReflections occluded on it, by sampler\n");
+  for (const Json& sampler : verification.at("reflections")) {
+    const auto occluded = sampler.at("occluded").get<std::uint64_t>(), samples = sampler.at("samples").get<std::uint64_t>();
+    fmt::print("  {:<8} {:>9} of {} ({:.2f} %)\n", sampler.at("sampler").get<std::string>(), occluded, samples,
+               percent(occluded, samples));
+  }
+}
+
+int run(const std::string& report_path, const std::string& verification_path) {
+  const auto report = read_json(report_path);
+  if (!report.ok()) return fail("summary", report.status());
+  const auto verification = read_json(verification_path);
+  if (!verification.ok()) return fail("summary", verification.status());
+  try {
+    const Json& machine = report->at("machine");
+    fmt::print("facetwise {} on {}, {} cores, {}\n", report->at("version").get<std::string>(),
+               machine.at("cpu").get<std::string>(), machine.at("cores").get<int>(), machine.at("target").get<std::string>());
+    print_verification(*verification);
+    Table(*report).print();
+  } catch (const Json::exception& error) {
+    return fail("summary", invalid("{}, {}: not what bench and verify write: {}", report_path, verification_path, error.what()));
+  }
+  return kDone;
+}
+
+}  // namespace
+
+Verb add_summary(CLI::App& app) {
+  struct Arguments {
+    std::string report, verification;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *app.add_subcommand("summary", "Print a summary of what bench and verify wrote as JSON");
+  command.footer("Example:\n  facetwise summary --report out/report.json --verification out/verify.json");
+  command.add_option("--report", arguments->report, "What `bench --json` wrote")->required()->type_name("FILE");
+  command.add_option("--verification", arguments->verification, "What `verify --json` wrote")->required()->type_name("FILE");
+  return {&command, [arguments] { return run(arguments->report, arguments->verification); }};
+}
+
+}  // namespace facetwise::app
