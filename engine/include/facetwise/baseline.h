@@ -1,6 +1,9 @@
 // The benchmarks' baseline: plain scalar float code with std:: maths, such as an expert would write in a
 // renderer today, one path at a time. Not a kernel, and shares no code with the kernels. No policy for
 // smooth or invalid lanes.
+//
+// Everything is inline, so that a loop with a fixed sampler that does not use the weight does not pay for
+// it, as in a renderer.
 #pragma once
 
 #include "facetwise/model.h"
@@ -18,11 +21,13 @@ struct Sample {
 };
 
 // Each takes the incident direction, roughness and uniform numbers as model.h says.
-Sample sample_normal(Sampler sampler, Vector i, float alpha_x, float alpha_y, float u1, float u2);
-Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, float alpha_x, float alpha_y, float u1,
-                         float u2, float u3);
-float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, float alpha_y);
-float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
-float masking(Vector i, float alpha_x, float alpha_y);
+inline Sample sample_normal(Sampler sampler, Vector i, float alpha_x, float alpha_y, float u1, float u2);
+inline Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, float alpha_x, float alpha_y,
+                                float u1, float u2, float u3);
+inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, float alpha_y);
+inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
+inline float masking(Vector i, float alpha_x, float alpha_y);
 
 }  // namespace facetwise::baseline
+
+#include "facetwise/baseline_inl.h"  // IWYU pragma: export

@@ -24,7 +24,7 @@ double masking(Roughness alpha, Vector i);
 double share_unoccluded(Roughness alpha, Vector i);
 // w = f cos(theta_o) / pdf_visible(o) with F = 1: how much of the outgoing light is not shadowed.
 double shadowing_weight(Shadowing shadowing, Roughness alpha, Vector i, Vector o);
-// Lower end of the sampled range of the stretched o_z for `bounded` (Eto & Tokuyoshi 2023): -k c.
+// k of `bounded`, whose stretched o_z starts at -k c (Eto & Tokuyoshi 2023, Eq. 5 and 6); 1 for i_z <= 0.
 double bounded_k(Roughness alpha, Vector i);
 
 // Density of normals m (samplers that draw normals) and of outgoing directions o, 1/sr.
@@ -40,6 +40,7 @@ struct Sample {
 };
 // The samples that model.h's mappings give for u1, u2, u3. sample_normal leaves o and weight 0.
 Sample sample_normal(Sampler sampler, Roughness alpha, Vector i, double u1, double u2, double u3);
-Sample sample_reflection(const Model& model, Sampler sampler, Roughness alpha, Vector i, double u1, double u2, double u3);
+Sample sample_reflection(const Model& model, Sampler sampler, Roughness alpha, Vector i, double u1, double u2,
+                         double u3);
 
 }  // namespace facetwise::reference
