@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
-#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "src/check.h"
@@ -13,8 +12,8 @@
 namespace facetwise {
 namespace {
 
-// Lanes that are copied into a tile's own buffers at a time: small enough for the first-level cache.
-constexpr std::size_t kStaged = 256;
+// Lanes of a tile: its buffers stay in the first-level cache.
+constexpr std::size_t kStaged = 512;
 static_assert(kStaged % kWidest == 0);
 
 Kernel kernel_for(const KernelTable& table, Operation operation, Sampler sampler) {
@@ -34,63 +33,80 @@ Kernel kernel_for(const KernelTable& table, Operation operation, Sampler sampler
 struct Plan {
   const KernelTable* table = nullptr;
   Kernel kernel = nullptr;
-  Column<float> in[kInputs];
-  OutputColumn<float> out[kOutputs];
-  OutputColumn<std::uint8_t> status;
   const std::uint32_t* active = nullptr;
   const Generator* generator = nullptr;
-  bool uncorrelated = false;
   bool generates_u3 = false;
-  bool direct = true;  // every column can be used where it lies
+  Tile tile;  // what is the same for every tile
+
+  // The columns that there are, by the tile's indices.
+  template <class Column>
+  struct Indexed {
+    std::size_t index;
+    Column column;
+  };
+  Indexed<Column<float>> per_lane[kInputs], one_value[kInputs];
+  Indexed<OutputColumn<float>> out[kOutputs];
+  std::size_t per_lane_count = 0, one_value_count = 0, out_count = 0;
+  OutputColumn<std::uint8_t> status;
 };
 
-Plan make_plan(Operation operation, const Batch& const_batch, const KernelTable& table) {
+void make_plan(Operation operation, const Batch& const_batch, const KernelTable& table, Plan& plan) {
   Batch batch = const_batch;
-  Plan plan;
   plan.table = &table;
   plan.kernel = kernel_for(table, operation, batch.sampler);
   plan.active = batch.active ? batch.active->data() : nullptr;
   plan.generator = const_batch.generator ? &*const_batch.generator : nullptr;
-  plan.uncorrelated = batch.model.shadowing == Shadowing::uncorrelated;
   plan.generates_u3 = plan.generator && uses_u3(batch.sampler);
-  plan.direct = !plan.active && !plan.generator;
   for (std::size_t k = 0; k < kInputs; ++k) {
-    plan.in[k] = input_fields()[k].column(batch);
-    if (plan.in[k].present() && !plan.in[k].one_value() && plan.in[k].stride() != sizeof(float)) plan.direct = false;
+    const Column<float>& column = input_fields()[k].column(batch);
+    if (!column.present()) continue;
+    if (column.one_value()) {
+      plan.one_value[plan.one_value_count++] = {k, column};
+    } else {
+      plan.per_lane[plan.per_lane_count++] = {k, column};
+    }
   }
   for (std::size_t k = 0; k < kOutputs; ++k) {
-    plan.out[k] = output_fields()[k].column(batch);
-    if (plan.out[k].present() && plan.out[k].stride() != sizeof(float)) plan.direct = false;
+    const OutputColumn<float>& column = output_fields()[k].column(batch);
+    if (!column.present()) continue;
+    plan.out[plan.out_count++] = {k, column};
+    if (k >= kOutMx && k <= kOutIm) plan.tile.wanted |= kWantsNormal;
+    if (k == kOutPdf) plan.tile.wanted |= kWantsPdf;
+    if (k == kOutWeight) plan.tile.wanted |= kWantsWeight;
+    if (k == kOutShare) plan.tile.wanted |= kWantsShare;
   }
   plan.status = batch.out.status;
-  if (plan.status.present() && plan.status.stride() != 1) plan.direct = false;
-  return plan;
+  if (plan.status.present()) plan.tile.wanted |= kWantsStatus;
+  plan.tile.uncorrelated = batch.model.shadowing == Shadowing::uncorrelated;
 }
 
-// The buffers of a tile whose columns cannot be used where they lie.
+// Runs a range of a plan's lanes, tile by tile. Contiguous columns are used where they lie; the others, and the
+// last lanes that do not fill a vector, go by way of buffers.
 class Stage {
  public:
-  explicit Stage(const Plan& plan) : plan_(plan) {
-    tile_.uncorrelated = plan.uncorrelated;
-    for (std::size_t k = 0; k < kInputs; ++k) {
-      if (!plan.in[k].one_value()) continue;
-      std::fill_n(one_value_[k], kWidest, plan.in[k][0]);
-      tile_.in[k] = {one_value_[k], 0};
+  explicit Stage(const Plan& plan) : plan_(plan), tile_(plan.tile) {
+    for (std::size_t c = 0; c < plan.one_value_count; ++c) {
+      const auto& [k, column] = plan.one_value[c];
+      std::fill_n(in_[k], kStaged, column[0]);
+      tile_.in[k] = in_[k];
     }
+    for (float*& out : tile_.out) out = unwanted_;
   }
 
   // Runs the positions [begin, end) of the batch, or of its active list.
   Statistics run(std::size_t begin, std::size_t end) {
     Statistics statistics;
     while (begin < end) {
-      // Whole vectors where they lie, the last few lanes by way of the buffers.
-      std::size_t lanes = end - begin;
+      std::size_t lanes = std::min(end - begin, kStaged);
       const bool whole = lanes >= kWidest;
       if (whole) lanes -= lanes % kWidest;
-      if (!plan_.direct || !whole) lanes = std::min(lanes, kStaged);
-      load(begin, lanes, whole);
+      tile_.lanes = lanes;
+      const bool in_place = whole && !plan_.active;
+      load(begin, in_place);
+      if (plan_.generator) generate(begin);
+      const bool staged = point_outputs(begin, in_place);
       plan_.kernel(tile_, statistics);
-      if (staged_outputs_) store(begin, lanes);
+      if (staged) store(begin);
       begin += lanes;
     }
     return statistics;
@@ -98,85 +114,85 @@ class Stage {
 
  private:
   std::size_t lane_at(std::size_t position) const { return plan_.active ? plan_.active[position] : position; }
+  // The buffers are read up to the next whole vector: zeros, which make an invalid lane.
+  std::size_t padding() const { return (kWidest - tile_.lanes % kWidest) % kWidest; }
 
-  void load(std::size_t begin, std::size_t lanes, bool whole) {
-    const bool in_place = whole && !plan_.active;
-    tile_.lanes = lanes;
-    for (std::size_t k = 0; k < kInputs; ++k) {
-      const Column<float>& column = plan_.in[k];
-      if (!column.present() || column.one_value()) continue;
-      if (in_place && column.stride() == sizeof(float)) {
-        tile_.in[k] = {column.data() + begin, std::numeric_limits<std::size_t>::max()};
+  void load(std::size_t begin, bool in_place) {
+    for (std::size_t c = 0; c < plan_.per_lane_count; ++c) {
+      const auto& [k, column] = plan_.per_lane[c];
+      const bool contiguous = column.stride() == sizeof(float) && !plan_.active;
+      if (in_place && contiguous) {
+        tile_.in[k] = column.data() + begin;
         continue;
       }
-      for (std::size_t j = 0; j < lanes; ++j) in_[k][j] = column[lane_at(begin + j)];
-      pad(k, lanes);
-    }
-    if (plan_.generator) generate(begin, lanes);
-    staged_outputs_ = false;
-    for (std::size_t k = 0; k < kOutputs; ++k) {
-      const OutputColumn<float>& column = plan_.out[k];
-      if (!column.present()) continue;
-      const bool direct = in_place && column.stride() == sizeof(float);
-      tile_.out[k] = direct ? column.data() + begin : out_[k];
-      staged_outputs_ |= !direct;
-    }
-    if (plan_.status.present()) {
-      const bool direct = in_place && plan_.status.stride() == 1;
-      tile_.status = direct ? plan_.status.data() + begin : status_;
-      staged_outputs_ |= !direct;
-    }
-  }
-
-  // Zeros behind the last lane, so that a whole vector can be read.
-  void pad(std::size_t k, std::size_t lanes) {
-    for (std::size_t j = lanes; j % kWidest != 0; ++j) in_[k][j] = 0.0f;
-    tile_.in[k] = {in_[k], std::numeric_limits<std::size_t>::max()};
-  }
-
-  void generate(std::size_t begin, std::size_t lanes) {
-    const Generator& generator = *plan_.generator;
-    PhiloxTile philox{.lanes = lanes, .seed = generator.seed, .dimension = generator.dimension};
-    philox.first_id = generator.first_id + begin;
-    if (generator.id.present() || plan_.active) {
-      for (std::size_t j = 0; j < lanes; ++j) {
-        const std::size_t lane = lane_at(begin + j);
-        std::uint64_t id = generator.first_id + lane;
-        if (generator.id.present())  // 4-byte alignment is enough for a column
-          std::memcpy(&id, reinterpret_cast<const char*>(generator.id.data()) + lane * generator.id.lane_stride(), 8);
-        id_low_[j] = static_cast<std::uint32_t>(id);
-        id_high_[j] = static_cast<std::uint32_t>(id >> 32);
+      if (contiguous) {
+        std::copy_n(column.data() + begin, tile_.lanes, in_[k]);
+      } else {
+        for (std::size_t j = 0; j < tile_.lanes; ++j) in_[k][j] = column[lane_at(begin + j)];
       }
-      for (std::size_t j = lanes; j % kWidest != 0; ++j) id_low_[j] = id_high_[j] = 0;
-      philox.id_low = id_low_;
-      philox.id_high = id_high_;
+      std::fill_n(in_[k] + tile_.lanes, padding(), 0.0f);
+      tile_.in[k] = in_[k];
+    }
+  }
+
+  void generate(std::size_t begin) {
+    const Generator& generator = *plan_.generator;
+    PhiloxTile philox{.lanes = tile_.lanes,
+                      .seed = generator.seed,
+                      .dimension = generator.dimension,
+                      .first_id = generator.first_id + begin};
+    if (generator.id.present() || plan_.active) {
+      for (std::size_t j = 0; j < tile_.lanes; ++j) {
+        const std::size_t lane = lane_at(begin + j);
+        id_[j] = generator.first_id + lane;
+        if (generator.id.present())  // 4-byte alignment is enough for a column
+          std::memcpy(&id_[j], reinterpret_cast<const char*>(generator.id.data()) + lane * generator.id.lane_stride(),
+                      sizeof id_[j]);
+      }
+      std::fill_n(id_ + tile_.lanes, padding(), 0);
+      philox.id = id_;
     }
     philox.u[0] = in_[kU1];
     philox.u[1] = in_[kU2];
     philox.u[2] = plan_.generates_u3 ? in_[kU3] : nullptr;
     plan_.table->philox(philox);
-    for (const InputIndex k : {kU1, kU2, kU3}) tile_.in[k] = {in_[k], std::numeric_limits<std::size_t>::max()};
+    for (const InputIndex k : {kU1, kU2, kU3}) tile_.in[k] = in_[k];
   }
 
-  void store(std::size_t begin, std::size_t lanes) {
-    for (std::size_t k = 0; k < kOutputs; ++k) {
+  // Returns true if an output goes by way of a buffer.
+  bool point_outputs(std::size_t begin, bool in_place) {
+    bool staged = false;
+    for (std::size_t c = 0; c < plan_.out_count; ++c) {
+      const auto& [k, column] = plan_.out[c];
+      const bool direct = in_place && column.stride() == sizeof(float);
+      tile_.out[k] = direct ? column.data() + begin : out_[k];
+      staged |= !direct;
+    }
+    if (plan_.status.present()) {
+      const bool direct = in_place && plan_.status.stride() == 1;
+      tile_.status = direct ? plan_.status.data() + begin : status_;
+      staged |= !direct;
+    }
+    return staged;
+  }
+
+  void store(std::size_t begin) {
+    for (std::size_t c = 0; c < plan_.out_count; ++c) {
+      const auto& [k, column] = plan_.out[c];
       if (tile_.out[k] != out_[k]) continue;
-      const OutputColumn<float>& column = plan_.out[k];
-      for (std::size_t j = 0; j < lanes; ++j) column[lane_at(begin + j)] = out_[k][j];
+      for (std::size_t j = 0; j < tile_.lanes; ++j) column[lane_at(begin + j)] = out_[k][j];
     }
     if (tile_.status == status_)
-      for (std::size_t j = 0; j < lanes; ++j) plan_.status[lane_at(begin + j)] = status_[j];
+      for (std::size_t j = 0; j < tile_.lanes; ++j) plan_.status[lane_at(begin + j)] = status_[j];
   }
 
   const Plan& plan_;
   Tile tile_;
-  bool staged_outputs_ = false;
-  alignas(64) float one_value_[kInputs][kWidest];
   alignas(64) float in_[kInputs][kStaged];
   alignas(64) float out_[kOutputs][kStaged];
+  alignas(64) float unwanted_[kStaged];
   alignas(64) std::uint8_t status_[kStaged];
-  alignas(64) std::uint32_t id_low_[kStaged];
-  alignas(64) std::uint32_t id_high_[kStaged];
+  alignas(64) std::uint64_t id_[kStaged];
 };
 
 }  // namespace
@@ -189,7 +205,8 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
     return absl::FailedPreconditionError(
         absl::StrCat("target: this CPU or build has no ", absl::string_view(wanted.data(), wanted.size())));
   }
-  const Plan plan = make_plan(operation, batch, kernels(*target, execution.one_lane));
+  Plan plan;
+  make_plan(operation, batch, kernels(*target, execution.one_lane), plan);
   const std::size_t positions = batch.active ? batch.active->size() : batch.lanes;
 
   std::atomic<std::uint64_t> occluded{0}, smooth{0}, invalid{0};

@@ -39,17 +39,13 @@ std::string count_message(std::size_t count, std::size_t lanes) {
 }  // namespace
 
 bool share_memory(const MemoryUse& a, const MemoryUse& b) {
-  if (a.count == 0 || b.count == 0) return false;
-  const std::uintptr_t a_end = a.begin + (a.count - 1) * a.stride + a.width;
-  const std::uintptr_t b_end = b.begin + (b.count - 1) * b.stride + b.width;
-  if (a_end <= b.begin || b_end <= a.begin) return false;
-  // The ranges meet; the values meet only if they do modulo the strides' common divisor (columns that are
-  // members of one array of structures do not).
-  const std::size_t a_stride = a.count > 1 ? a.stride : 0, b_stride = b.count > 1 ? b.stride : 0;
-  const std::size_t step = std::gcd(a_stride, b_stride);
+  if (!ranges_meet(a, b)) return false;
+  // The values meet only if they do modulo the strides' common divisor: columns that are members of one array
+  // of structures do not.
+  const std::size_t step = std::gcd(a.stride, b.stride);
   if (step == 0) return true;
-  const std::uintptr_t distance = b.begin >= a.begin ? (b.begin - a.begin) % step
-                                                     : (step - (a.begin - b.begin) % step) % step;
+  const std::uintptr_t distance =
+      b.begin >= a.begin ? (b.begin - a.begin) % step : (step - (a.begin - b.begin) % step) % step;
   return distance < a.width || step - distance < b.width;
 }
 
@@ -137,7 +133,7 @@ absl::Status check_overlap(Batch& batch) {
   if (batch.generator && batch.generator->id.present())
     inputs[input_count++] = {"generator.id", memory_use(batch.generator->id)};
   if (batch.active)
-    inputs[input_count++] = {"active", {address(batch.active->data()), batch.active->size(), 4, 4}};
+    inputs[input_count++] = {"active", memory_use(batch.active->data(), batch.active->size(), 4, 4)};
   for (const OutputField& field : output_fields())
     if (const auto& column = field.column(batch); column.present())
       outputs[output_count++] = {view(field.name), memory_use(column)};

@@ -13,16 +13,24 @@ namespace facetwise {
 
 // The memory of a column, for finding overlaps.
 struct MemoryUse {
-  std::uintptr_t begin = 0;
-  std::size_t count = 0, stride = 0, width = 0;
+  std::uintptr_t begin = 0, end = 0;
+  std::size_t stride = 0, width = 0;  // stride 0: one value
   bool operator==(const MemoryUse&) const = default;
 };
-bool share_memory(const MemoryUse& a, const MemoryUse& b);
 
+inline MemoryUse memory_use(const void* data, std::size_t count, std::size_t stride, std::size_t width) {
+  const auto begin = reinterpret_cast<std::uintptr_t>(data);
+  if (count == 0) return {};
+  return {begin, begin + (count - 1) * stride + width, count > 1 ? stride : 0, width};
+}
 template <class Column>
 MemoryUse memory_use(const Column& column) {
-  return {reinterpret_cast<std::uintptr_t>(column.data()), column.count(), column.stride(), sizeof(*column.data())};
+  return memory_use(column.data(), column.count(), column.stride(), sizeof(*column.data()));
 }
+
+// Whether two columns' ranges meet, and whether their values do.
+inline bool ranges_meet(const MemoryUse& a, const MemoryUse& b) { return a.begin < b.end && b.begin < a.end; }
+bool share_memory(const MemoryUse& a, const MemoryUse& b);
 
 // Length, null, alignment, stride. Errors begin with the field's name.
 template <class T>

@@ -32,7 +32,7 @@ absl::Status check(const Compaction& c) {
     };
     if (share_memory(use, memory_use(c.status))) return overlaps("status");
     if (c.active &&
-        share_memory(use, {reinterpret_cast<std::uintptr_t>(c.active->data()), c.active->size(), 4, 4}))
+        share_memory(use, memory_use(c.active->data(), c.active->size(), 4, 4)))
       return overlaps("active");
     for (std::size_t j = 0; j < c.columns.size(); ++j) {
       if (share_memory(use, memory_use(c.columns[j].from))) return overlaps(field(j, "from"));

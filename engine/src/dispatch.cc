@@ -17,18 +17,34 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D>
+template <class D, class Sampler, bool kNormal>
+constexpr Kernel SampleKernel() {
+  return ForEachVector<D, Sample<D, Sampler, kNormal>>;
+}
+template <class D, class Sampler, bool kValue, bool kPdf>
+constexpr Kernel QueryKernel() {
+  return ForEachVector<D, Query<D, Sampler, kValue, kPdf>>;
+}
+
+// D: the tag of one vector. Two: that of the sampler with the longest chain, which gains by 15 % from pairs;
+// the others lose up to 9 % by them where registers are few.
+template <class D, class Two>
 constexpr KernelTable MakeTable() {
   return {
-      .sample_normal = {Sample<D, Ndf, true>, Sample<D, Heitz, true>, Sample<D, Cap, true>, nullptr, nullptr},
-      .sample_reflection = {Sample<D, Ndf, false>, Sample<D, Heitz, false>, Sample<D, Cap, false>,
-                            Sample<D, Bounded, false>, Sample<D, Exact, false>},
-      .pdf_reflection = {Query<D, Ndf, false, true>, Query<D, Cap, false, true>, Query<D, Cap, false, true>,
-                         Query<D, Bounded, false, true>, Query<D, Exact, false, true>},
-      .evaluate_reflection = Query<D, Cap, true, false>,
-      .evaluate_and_pdf = {Query<D, Ndf, true, true>, Query<D, Cap, true, true>, Query<D, Cap, true, true>,
-                           Query<D, Bounded, true, true>, Query<D, Exact, true, true>},
-      .masking = MaskingKernel<D>,
+      .sample_normal = {SampleKernel<D, Ndf, true>(), SampleKernel<D, Heitz, true>(), SampleKernel<D, Cap, true>(),
+                        nullptr, nullptr},
+      .sample_reflection = {SampleKernel<D, Ndf, false>(), SampleKernel<D, Heitz, false>(),
+                            SampleKernel<D, Cap, false>(), SampleKernel<D, Bounded, false>(),
+                            SampleKernel<Two, Exact, false>()},
+      // heitz and cap have one density.
+      .pdf_reflection = {QueryKernel<D, Ndf, false, true>(), QueryKernel<D, Cap, false, true>(),
+                         QueryKernel<D, Cap, false, true>(), QueryKernel<D, Bounded, false, true>(),
+                         QueryKernel<D, Exact, false, true>()},
+      .evaluate_reflection = QueryKernel<D, Cap, true, false>(),
+      .evaluate_and_pdf = {QueryKernel<D, Ndf, true, true>(), QueryKernel<D, Cap, true, true>(),
+                           QueryKernel<D, Cap, true, true>(), QueryKernel<D, Bounded, true, true>(),
+                           QueryKernel<D, Exact, true, true>()},
+      .masking = ForEachVector<D, MaskingOf<D>>,
       .philox = Philox<D>,
       .vector_lanes = hn::MaxLanes(D()),
   };
@@ -36,8 +52,8 @@ constexpr KernelTable MakeTable() {
 
 extern const KernelTable kTable;
 extern const KernelTable kOneLaneTable;
-const KernelTable kTable = MakeTable<hn::ScalableTag<float>>();
-const KernelTable kOneLaneTable = MakeTable<hn::CappedTag<float, 1>>();
+const KernelTable kTable = MakeTable<hn::ScalableTag<float>, Twice<hn::ScalableTag<float>>>();
+const KernelTable kOneLaneTable = MakeTable<hn::CappedTag<float, 1>, hn::CappedTag<float, 1>>();
 
 }  // namespace HWY_NAMESPACE
 }  // namespace facetwise

@@ -17,34 +17,36 @@ enum OutputIndex {
   kOutArea, kOutShare, kOutputs
 };
 
-// The widest vector of any target, in lanes. Every buffer of a tile may be read and written up to the next
+inline constexpr unsigned kWantsNormal = 1;  // m or i.m
+inline constexpr unsigned kWantsPdf = 2;
+inline constexpr unsigned kWantsWeight = 4;
+inline constexpr unsigned kWantsShare = 8;
+inline constexpr unsigned kWantsStatus = 16;
+
+// The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and written up to the next
 // multiple of it.
-inline constexpr std::size_t kWidest = 16;
+inline constexpr std::size_t kWidest = 32;
 
 struct Tile {
-  struct Input {
-    const float* data;
-    std::size_t lane_mask;  // lane & lane_mask indexes data: all ones, or 0 for kWidest equal values
-  };
   std::size_t lanes = 0;
-  Input in[kInputs] = {};
-  float* out[kOutputs] = {};       // null: not wanted
-  std::uint8_t* status = nullptr;  // null: not wanted
+  const float* in[kInputs] = {};   // those that the operation reads
+  float* out[kOutputs] = {};       // all that it has; unwanted ones are scratch memory
+  std::uint8_t* status = nullptr;  // likewise
+  unsigned wanted = 0;             // kWants...: where leaving an output out saves work
   bool uncorrelated = false;       // Shadowing::uncorrelated
 };
 
-// Adds the tile's lanes to the statistics.
+// Adds the tile's lanes that are not accepted to the statistics.
 using Kernel = void (*)(const Tile& tile, Statistics& statistics);
 
 // Philox words of `lanes` lanes as uniform numbers; u[k] may be null. Ids are first_id + lane, or those of
-// the halves id_low, id_high where these are given.
+// id where it is given.
 struct PhiloxTile {
   std::size_t lanes = 0;
   std::uint64_t seed = 0;
   std::uint32_t dimension = 0;
   std::uint64_t first_id = 0;
-  const std::uint32_t* id_low = nullptr;
-  const std::uint32_t* id_high = nullptr;
+  const std::uint64_t* id = nullptr;
   float* u[3] = {};
 };
 

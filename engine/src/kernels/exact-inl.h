@@ -26,7 +26,7 @@ struct Cone {
   V inverse_p, inverse_q;    // 1 / (lambda + i_z ax^2), 1 / (lambda + i_z ay^2)
   V vx, vy;                  // the axis (v_x, v_y, 1)
   V inverse_n2;              // 1 / v.v
-  V four_k;                  // 4 K = 4 lambda^2 / (n2 sqrt(P Q))
+  V two_k;                   // 2 K = 2 lambda^2 / (n2 sqrt(P Q))
 };
 
 // One Halley step for the root of f(l) = l - i_z - w_x^2 / P - w_y^2 / Q, given 1/P and 1/Q at l.
@@ -35,7 +35,7 @@ HWY_INLINE V HalleyStep(D d, const Incident<D>& i, V l, V inverse_p, V inverse_q
   const V x = i.wx * i.wx * inverse_p, y = i.wy * i.wy * inverse_q;
   const V x1 = x * inverse_p, y1 = y * inverse_q;
   const V f = l - i.z - (x + y);
-  const V f1 = x1 + y1 + hn::Set(d, 1.0f);
+  const V f1 = x1 + y1 + Set(d, 1.0f);
   const V f2 = Fma(x1, inverse_p, y1 * inverse_q);  // minus half the second derivative
   return NegFma(f, f1 / Fma(f1, f1, f * f2), l);
 }
@@ -44,7 +44,7 @@ HWY_INLINE V HalleyStep(D d, const Incident<D>& i, V l, V inverse_p, V inverse_q
 // a division.
 template <class D, class V = Vec<D>>
 HWY_INLINE V RefineReciprocal(D d, V x, V y) {
-  const V one = hn::Set(d, 1.0f);
+  const V one = Set(d, 1.0f);
   const V e = NegFma(x, y, one);
   y = Fma(y, Fma(e, e, e), y);
   return Fma(y, NegFma(x, y, one), y);
@@ -52,23 +52,23 @@ HWY_INLINE V RefineReciprocal(D d, V x, V y) {
 
 template <class D, class V = Vec<D>>
 HWY_INLINE void MakeCone(D d, const Incident<D>& i, Cone<D>& cone) {
-  const V one = hn::Set(d, 1.0f);
+  const V one = Set(d, 1.0f);
   const V px = i.z * (i.ax * i.ax);
   const auto isotropic = i.ax == i.ay;
-  const bool all_isotropic = hn::AllTrue(d, isotropic);
+  const bool all_isotropic = AllTrue(d, isotropic);
 
   // lambda for isotropic roughness; otherwise a start from below, with the mean of i_z alpha^2.
   V py = px, mean = px;
   if (!all_isotropic) {
     py = i.z * (i.ay * i.ay);
-    mean = Select(isotropic, px, Fma(i.wx * i.wx, px, i.wy * i.wy * py) / i.a);
+    mean = Select(isotropic, px, Fma(i.wx * i.wx, px, i.wy * i.wy * py) / Max(i.a, Set(d, kSmallestA)));
   }
   const V sum = i.z + mean, difference = i.z - mean;
   const V two_a = i.a + i.a;
-  const V root = hn::Sqrt(Fma(sum, sum, two_a + two_a));
-  V lambda = hn::Set(d, 0.5f) * (difference + root);
-  const auto cancels = difference < hn::Zero(d);
-  if (!hn::AllFalse(d, cancels)) {
+  const V root = Sqrt(Fma(sum, sum, two_a + two_a));
+  V lambda = Set(d, 0.5f) * (difference + root);
+  const auto cancels = difference < Zero(d);
+  if (!AllFalse(d, cancels)) {
     const V numerator = Fma(i.z, mean, i.a);
     lambda = Select(cancels, (numerator + numerator) / (root - difference), lambda);
   }
@@ -93,83 +93,83 @@ HWY_INLINE void MakeCone(D d, const Incident<D>& i, Cone<D>& cone) {
       cone.inverse_p = Select(lanes, q * inverse_pq, cone.inverse_p);
       cone.inverse_q = Select(lanes, p * inverse_pq, cone.inverse_q);
     };
-    step(hn::Not(isotropic));
-    const auto rough = hn::AndNot(isotropic, hn::Max(i.ax, i.ay) > one);
-    const auto smoother = hn::Not(hn::Or(isotropic, rough));
+    step(Not(isotropic));
+    const auto rough = AndNot(isotropic, Max(i.ax, i.ay) > one);
+    const auto smoother = Not(Or(isotropic, rough));
     cone.inverse_p = Select(smoother, RefineReciprocal(d, p, cone.inverse_p), cone.inverse_p);
     cone.inverse_q = Select(smoother, RefineReciprocal(d, q, cone.inverse_q), cone.inverse_q);
-    if (!hn::AllFalse(d, rough)) {
+    if (!AllFalse(d, rough)) {
       divide(rough);
       step(rough);
       divide(rough);
-      const auto rougher = hn::AndNot(isotropic, hn::Max(i.ax, i.ay) > hn::Set(d, 4.0f));
-      if (!hn::AllFalse(d, rougher)) {
+      const auto rougher = AndNot(isotropic, Max(i.ax, i.ay) > Set(d, 4.0f));
+      if (!AllFalse(d, rougher)) {
         step(rougher);
         divide(rougher);
       }
     }
-    inverse_root = hn::Sqrt(cone.inverse_p * cone.inverse_q);
+    inverse_root = Sqrt(cone.inverse_p * cone.inverse_q);
   }
 
   cone.lambda = lambda;
   cone.vx = i.wx * cone.inverse_p;
   cone.vy = i.wy * cone.inverse_q;
   cone.inverse_n2 = one / Fma(cone.vx, cone.vx, Fma(cone.vy, cone.vy, one));
-  const V two_lambda = lambda + lambda;
-  cone.four_k = two_lambda * two_lambda * (cone.inverse_n2 * inverse_root);
+  cone.two_k = (lambda + lambda) * lambda * (cone.inverse_n2 * inverse_root);
 }
 
 struct Exact {
   static constexpr bool kUnit = false;
   static constexpr bool kUsesU3 = true;
   static constexpr bool kVisible = true;
+  static constexpr bool kNIsSigma = false;
   static constexpr bool kExact = true;
 
   template <class D, class V = Vec<D>>
-  static HWY_INLINE V FourN(D d, const Incident<D>& i, V, V) {
+  static HWY_INLINE V TwoN(D d, const Incident<D>& i, V, V) {
     Cone<D> cone;
     MakeCone(d, i, cone);
-    return Select(i.z > hn::Zero(d), cone.four_k, FourSigma(i));
+    return Select(i.front, cone.two_k, i.t);
   }
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V u3, Drawn<D>& drawn) {
     Cone<D> cone;
     MakeCone(d, i, cone);
-    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), rim = hn::Set(d, kRim);
+    const V one = Set(d, 1.0f), rim = Set(d, kRim);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
 
     // A point (xi, eta) of the ellipse, uniformly; the point of the sphere above it, along the axis v.
     const V lambda_u = cone.lambda * u1;
-    const V rp = hn::Sqrt(lambda_u * cone.inverse_p);
+    const V rp = Sqrt(lambda_u * cone.inverse_p);
     V rq = rp;
-    if (!hn::AllTrue(d, i.ax == i.ay)) rq = hn::Sqrt(lambda_u * cone.inverse_q);
+    if (!AllTrue(d, i.ax == i.ay)) rq = Sqrt(lambda_u * cone.inverse_q);
     const V xi = rp * cos, eta = rq * sin;
     const V along = Fma(xi, cone.vx, eta * cone.vy);
-    const V y = hn::Neg(along * cone.inverse_n2);
+    const V y = Neg(along * cone.inverse_n2);
     // zeta^2 v.v = 1 - xi^2 - eta^2 + along^2 / v.v. At the rim 1 - xi^2 - eta^2 cancels; by 1 - lambda / P =
     // i_z ax^2 / P it is a sum of positive terms: (1 - u1) lambda X + i_z (ax^2 cos^2 / P + ay^2 sin^2 / Q),
     // X = cos^2 / P + sin^2 / Q.
     const V cp = cos * cos * cone.inverse_p, sq = sin * sin * cone.inverse_q;
     const V inside = Fma((one - u1) * cone.lambda, cp + sq, i.z * Fma(i.ax * i.ax, cp, i.ay * i.ay * sq));
-    const V zeta = hn::Sqrt(Fma(y, y, inside * cone.inverse_n2));
+    const V zeta = Sqrt(Fma(y, y, inside * cone.inverse_n2));
 
     // The sample or its mirror image about the axis, in proportion to w.m_hat.
     const V across = Fma(xi, i.wx, eta * i.wy);
     const V g_zeta = cone.lambda * zeta;
     const V threshold = Fma(cone.lambda, y, across) + g_zeta;
-    const auto mirrored = hn::Not(u3 * (g_zeta + g_zeta) < threshold);
-    const V sign = hn::IfThenElseZero(mirrored, hn::SignBit(d));
-    const V hz = hn::Max(zeta + hn::Xor(y, sign), rim);
-    const V hx = Fma(hz, cone.vx, hn::Xor(xi, sign)), hy = Fma(hz, cone.vy, hn::Xor(eta, sign));
+    const auto mirrored = Not(u3 * (g_zeta + g_zeta) < threshold);
+    const V sign = IfThenElseZero(mirrored, SignBit(d));
+    const V hz = Max(zeta + Xor(y, sign), rim);
+    const V hx = Fma(hz, cone.vx, Xor(xi, sign)), hy = Fma(hz, cone.vy, Xor(eta, sign));
     Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = hn::Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), rim * cone.lambda);
-    drawn.four_n = cone.four_k;
+    drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), rim * cone.lambda);
+    drawn.two_n = cone.two_k;
 
     // Behind, nothing is occluded: the cap.
-    const auto front = i.z > zero;
-    if (!hn::AllTrue(d, front)) {
+    const auto front = i.front;
+    if (!i.all_front) {
       Drawn<D> cap;
       Cap::Draw(d, i, u1, u2, u3, cap);
       drawn.mx = Select(front, drawn.mx, cap.mx);
@@ -177,7 +177,7 @@ struct Exact {
       drawn.mz = Select(front, drawn.mz, cap.mz);
       drawn.mm = Select(front, drawn.mm, cap.mm);
       drawn.im = Select(front, drawn.im, cap.im);
-      drawn.four_n = Select(front, drawn.four_n, cap.four_n);
+      drawn.two_n = Select(front, drawn.two_n, cap.two_n);
     }
   }
 };

@@ -17,9 +17,10 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 inline constexpr float kPi = 3.14159265358979f;
+inline constexpr float kLengthTolerance = 1e-3f;  // of |v|^2 of a direction
 
-// Where i is straight below (i = (0, 0, -1)) no normal is visible and sigma is 0. A is kept above this, as if
-// i were tilted by a stretched 3e-8, so that densities stay finite. Nothing else is touched by it.
+// Where i is straight below (i = (0, 0, -1)) no normal is visible and sigma is 0. Behind the surface A is taken
+// as this at least, as if i were tilted by a stretched 3e-8, so that densities stay finite.
 inline constexpr float kSmallestA = 0x1p-50f;
 
 template <class D>
@@ -28,9 +29,11 @@ struct Incident {
   V x, y, z;
   V ax, ay;
   V wx, wy;
-  V a;   // A, at least kSmallestA
+  V a;   // A
   V nu;  // length of w
   V t;   // 2 sigma(i)
+  Mask<D> front;  // i_z > 0
+  bool all_front;
 };
 
 template <class D, class V = Vec<D>>
@@ -43,12 +46,13 @@ HWY_INLINE Incident<D> Prepare(D d, V x, V y, V z, V ax, V ay) {
   i.ay = ay;
   i.wx = ax * x;
   i.wy = ay * y;
-  i.a = hn::Max(Fma(i.wx, i.wx, i.wy * i.wy), hn::Set(d, kSmallestA));
-  i.nu = hn::Sqrt(Fma(z, z, i.a));
+  i.a = Fma(i.wx, i.wx, i.wy * i.wy);
+  i.nu = Sqrt(Fma(z, z, i.a));
   i.t = i.nu + z;
+  i.front = z > Zero(d);
+  i.all_front = AllTrue(d, i.front);
   // Behind the surface i_z + nu cancels: A / (nu - i_z).
-  const auto behind = z <= hn::Zero(d);
-  if (!hn::AllFalse(d, behind)) i.t = Select(behind, i.a / (i.nu - z), i.t);
+  if (!i.all_front) i.t = Select(i.front, i.t, Max(i.a, Set(d, kSmallestA)) / (i.nu - z));
   return i;
 }
 
@@ -71,14 +75,14 @@ HWY_INLINE void ShadowingWeight(D d, const Incident<D>& i, V ox, V oy, V oz, boo
                                 V& denominator) {
   const V wx = i.ax * ox, wy = i.ay * oy;
   const V a = Fma(wx, wx, wy * wy);
-  oz = hn::Max(oz, hn::Set(d, 0x1p-60f));
-  const V s = oz + hn::Sqrt(Fma(oz, oz, a));
+  oz = Max(oz, Set(d, 0x1p-60f));
+  const V s = oz + Sqrt(Fma(oz, oz, a));
   if (uncorrelated) {
     numerator = oz + oz;
     denominator = s;
   } else {
     numerator = i.t * (oz * s);
-    denominator = Fma(hn::Abs(i.z), a, numerator);
+    denominator = Fma(Abs(i.z), a, numerator);
   }
 }
 

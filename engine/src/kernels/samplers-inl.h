@@ -6,6 +6,7 @@
 //   kUnit       m_hat is of unit length; else it is a half vector w + nu o_hat, so that |m_hat|^2 = 2 i.M
 //   kVisible    i.m > 0 always
 //   kUsesU3     u3 is read
+//   kNIsSigma   N = sigma(i)
 //   kExact      for i_z > 0 no reflection is occluded; m_hat is of unit length there, else a half vector
 
 #if defined(FACETWISE_SAMPLERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -31,7 +32,7 @@ struct Drawn {
   V mx, my, mz;  // M
   V mm;          // M . M
   V im;          // i . M = w . m_hat
-  V four_n;      // 4 N
+  V two_n;       // 2 N
 };
 
 // Fills in M and M.M from m_hat.
@@ -43,34 +44,28 @@ HWY_INLINE void Unstretch(const Incident<D>& i, V hx, V hy, V hz, Drawn<D>& draw
   drawn.mm = Dot(drawn.mx, drawn.my, drawn.mz, drawn.mx, drawn.my, drawn.mz);
 }
 
-// 4 sigma(i): what normalises heitz and cap.
-template <class D, class V = Vec<D>>
-HWY_INLINE V FourSigma(const Incident<D>& i) {
-  return i.t + i.t;
-}
-
 // Normals with density D(m) m_z (Walter 2007, Eqs. 35, 36): p(o) = D(m) m_z / (4 |i.m|).
 struct Ndf {
   static constexpr bool kUnit = true;
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = false;
+  static constexpr bool kNIsSigma = false;
   static constexpr bool kExact = false;
 
   template <class D, class V = Vec<D>>
-  static HWY_INLINE V FourN(D, const Incident<D>&, V im, V mz) {
-    const V four_im = (im + im) + (im + im);
-    return four_im / mz;
+  static HWY_INLINE V TwoN(D, const Incident<D>&, V im, V mz) {
+    return (im + im) / mz;
   }
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
-    const V r = hn::Sqrt(u1);
-    const V hx = r * cos, hy = r * sin, hz = hn::Sqrt(hn::Set(d, 1.0f) - u1);
+    const V r = Sqrt(u1);
+    const V hx = r * cos, hy = r * sin, hz = Sqrt(Set(d, 1.0f) - u1);
     Unstretch(i, hx, hy, hz, drawn);
     drawn.im = Dot(i.wx, i.wy, i.z, hx, hy, hz);
-    drawn.four_n = FourN(d, i, drawn.im, drawn.mz);
+    drawn.two_n = TwoN(d, i, drawn.im, drawn.mz);
   }
 };
 
@@ -83,51 +78,51 @@ struct Heitz {
   static constexpr bool kUnit = true;
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = true;
+  static constexpr bool kNIsSigma = true;
   static constexpr bool kExact = false;
 
   template <class D, class V = Vec<D>>
-  static HWY_INLINE V FourN(D, const Incident<D>& i, V, V) {
-    return FourSigma(i);
+  static HWY_INLINE V TwoN(D, const Incident<D>& i, V, V) {
+    return i.t;
   }
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
-    const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
 
     // Straight up or down e is (1, 0).
-    const V horizontal = hn::Sqrt(Fma(i.wx, i.wx, i.wy * i.wy));
-    const auto vertical = horizontal < hn::Set(d, 1e-15f);
+    const V horizontal = Sqrt(Fma(i.wx, i.wx, i.wy * i.wy));
+    const auto vertical = horizontal < Set(d, 1e-15f);
     const V scale = one / Select(vertical, one, horizontal);
     const V ex = Select(vertical, one, i.wx * scale), ey = Select(vertical, zero, i.wy * scale);
     const V inverse_nu = one / i.nu;
     const V c = i.z * inverse_nu, s_hat = horizontal * inverse_nu;
     const V s = half * i.t * inverse_nu;
 
-    const V r = hn::Sqrt(u1);
+    const V r = Sqrt(u1);
     const V t1 = r * cos, radial = r * sin;
     const V rest = one - u1;
-    const V big_r = hn::Sqrt(hn::Max((one - t1) * (one + t1), rest));
-    const V larger = big_r + hn::Abs(radial), smaller = rest / larger;
+    const V big_r = Sqrt(Max((one - t1) * (one + t1), rest));
+    const V larger = big_r + Abs(radial), smaller = rest / larger;
     const auto upper = radial > zero;
     const V b = Select(upper, smaller, larger), p = Select(upper, larger, smaller);
     const V t2 = NegFma(s, b, big_r);
-    const V tw = hn::Sqrt(s * b * NegFma(s, b, big_r + big_r));
+    const V tw = Sqrt(s * b * NegFma(s, b, big_r + big_r));
 
-    const V radial_xy = Fma(tw, s_hat, hn::Neg(t2 * c));
-    const V hx = Fma(radial_xy, ex, hn::Neg(t1 * ey)), hy = Fma(radial_xy, ey, t1 * ex);
+    const V radial_xy = Fma(tw, s_hat, Neg(t2 * c));
+    const V hx = Fma(radial_xy, ex, Neg(t1 * ey)), hy = Fma(radial_xy, ey, t1 * ex);
     // m_hat_z = t2 s_hat + t_w c; behind it cancels, and is s p (2R - s (2R + b)) / (t2 s_hat + t_w |c|).
-    const V sum = Fma(t2, s_hat, tw * hn::Abs(c));
+    const V sum = Fma(t2, s_hat, tw * Abs(c));
     V hz = sum;
-    const auto behind = c < zero;
-    if (!hn::AllFalse(d, behind)) {
+    if (!i.all_front) {
       const V two_r = big_r + big_r;
-      hz = Select(behind, s * p * NegFma(s, two_r + b, two_r) / sum, hz);
+      hz = Select(i.front, hz, s * p * NegFma(s, two_r + b, two_r) / sum);
     }
     Unstretch(i, hx, hy, hz, drawn);
     drawn.im = i.nu * tw;
-    drawn.four_n = FourSigma(i);
+    drawn.two_n = i.t;
   }
 };
 
@@ -139,13 +134,13 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   V sin, cos;
   SinCosTurn(d, u2, sin, cos);
   const V height = t * u1;  // nu (1 - o_hat_z)
-  const V radius = hn::Sqrt(height * (i.nu + i.nu - height));
+  const V radius = Sqrt(height * (i.nu + i.nu - height));
   const V hx = Fma(radius, cos, i.wx), hy = Fma(radius, sin, i.wy);
-  const V hz = Fma(t, hn::Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
+  const V hz = Fma(t, Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but this keeps o of unit length where m_hat is short and its rounding counts.
-  drawn.im = hn::Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), hn::Set(d, kSmallestIm));
-  drawn.four_n = t + t;
+  drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
+  drawn.two_n = t;
 }
 
 // Visible normals by a spherical cap: Dupuy & Benyoub 2023.
@@ -153,16 +148,17 @@ struct Cap {
   static constexpr bool kUnit = false;
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = true;
+  static constexpr bool kNIsSigma = true;
   static constexpr bool kExact = false;
 
   template <class D, class V = Vec<D>>
-  static HWY_INLINE V FourN(D, const Incident<D>& i, V, V) {
-    return FourSigma(i);
+  static HWY_INLINE V TwoN(D, const Incident<D>& i, V, V) {
+    return i.t;
   }
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
-    DrawFromCap(d, i, i.t, hn::Zero(d), u1, u2, drawn);
+    DrawFromCap(d, i, i.t, Zero(d), u1, u2, drawn);
   }
 };
 
@@ -175,30 +171,40 @@ struct Bounded {
   static constexpr bool kUnit = false;
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = true;
+  static constexpr bool kNIsSigma = false;
   static constexpr bool kExact = false;
 
   // t: nu + k i_z. above: (1 - k) i_z.
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Bound(D d, const Incident<D>& i, V& t, V& above) {
-    const V one = hn::Set(d, 1.0f);
-    const V a = Select(i.ax == i.ay, i.ax, hn::Min(hn::Min(i.ax, i.ay), one));
-    const V a2 = a * a, z2 = i.z * i.z;
-    const V sum = one + hn::Sqrt(Fma(i.x, i.x, i.y * i.y));
+    const V one = Set(d, 1.0f);
+    const V z2 = i.z * i.z;
+    const V sum = one + Sqrt(Fma(i.x, i.x, i.y * i.y));
     const V sum2 = sum * sum;
-    const auto rough = a > one;
-    const V p = Select(rough, z2, sum2), q = Select(rough, sum2, z2);
+    V a = Min(i.ax, i.ay), p = sum2, q = z2;
+    const auto rough = Max(i.ax, i.ay) > one;
+    if (!AllFalse(d, rough)) {
+      a = Select(i.ax == i.ay, a, Min(a, one));
+      const auto swapped = a > one;
+      p = Select(swapped, z2, sum2);
+      q = Select(swapped, sum2, z2);
+    }
+    const V a2 = a * a;
     const V scale = i.z / Fma(a2, q, p);
-    const auto front = i.z > hn::Zero(d);
     // 1 - a^2 as (1 - a)(1 + a): no cancellation near 1.
-    t = Select(front, Fma((one - a) * (one + a) * p, scale, i.nu), i.t);
-    above = hn::IfThenElseZero(front, a2 * (sum2 + z2) * scale);
+    t = Fma((one - a) * (one + a) * p, scale, i.nu);
+    above = a2 * (sum2 + z2) * scale;
+    if (!i.all_front) {
+      t = Select(i.front, t, i.t);
+      above = IfThenElseZero(i.front, above);
+    }
   }
 
   template <class D, class V = Vec<D>>
-  static HWY_INLINE V FourN(D d, const Incident<D>& i, V, V) {
+  static HWY_INLINE V TwoN(D d, const Incident<D>& i, V, V) {
     V t, above;
     Bound(d, i, t, above);
-    return t + t;
+    return t;
   }
 
   template <class D, class V = Vec<D>>

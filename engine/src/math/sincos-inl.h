@@ -18,30 +18,33 @@ namespace HWY_NAMESPACE {
 // Chebyshev nodes in r^2 on [0, 1/4] (errors 4.9e-9 and 1.9e-10 before rounding).
 template <class D, class V = Vec<D>>
 HWY_INLINE void SinCosTurn(D d, V u, V& sin, V& cos) {
-  const hn::Rebind<int32_t, D> di;
-  const V quarters = u * hn::Set(d, 4.0f);
-  const auto quadrant = hn::ConvertTo(di, quarters + hn::Set(d, 0.5f));
-  const V r = quarters - hn::ConvertTo(d, quadrant);
+  // Adding 1.5 * 2^23 rounds to the nearest integer, which is then the low bits of the sum.
+  const V magic = Set(d, 12582912.0f), four = Set(d, 4.0f);
+  const V rounded = Fma(u, four, magic);
+  const V r = Fms(u, four, rounded - magic);
   const V y = r * r;
 
-  V s = hn::Set(d, -0.0046021176159932635f);
-  s = Fma(s, y, hn::Set(d, 0.07968020776898675f));
-  s = Fma(s, y, hn::Set(d, -0.6459634769234417f));
-  s = Fma(s, y, hn::Set(d, 1.570796321945507f)) * r;
+  V s = Set(d, -0.0046021176159932635f);
+  s = Fma(s, y, Set(d, 0.07968020776898675f));
+  s = Fma(s, y, Set(d, -0.6459634769234417f));
+  s = Fma(s, y, Set(d, 1.570796321945507f)) * r;
 
-  V c = hn::Set(d, 0.0009067349218241515f);
-  c = Fma(c, y, hn::Set(d, -0.020861526786172185f));
-  c = Fma(c, y, hn::Set(d, 0.2536694102403011f));
-  c = Fma(c, y, hn::Set(d, -1.2337005493729984f));
-  c = Fma(c, y, hn::Set(d, 1.0f));
+  V c = Set(d, 0.0009067349218241515f);
+  c = Fma(c, y, Set(d, -0.020861526786172185f));
+  c = Fma(c, y, Set(d, 0.2536694102403011f));
+  c = Fma(c, y, Set(d, -1.2337005493729984f));
+  c = Fma(c, y, Set(d, 1.0f));
 
   // An odd quadrant swaps; bit 1 of the quadrant negates the sine, of the next quadrant the cosine.
-  const auto one = hn::Set(di, 1);
-  const auto odd = hn::RebindMask(d, (quadrant & one) == one);
-  const V sin_sign = hn::BitCast(d, hn::ShiftLeft<30>(quadrant & hn::Set(di, 2)));
-  const V cos_sign = hn::BitCast(d, hn::ShiftLeft<30>((quadrant + one) & hn::Set(di, 2)));
-  sin = hn::Xor(Select(odd, c, s), sin_sign);
-  cos = hn::Xor(Select(odd, s, c), cos_sign);
+  const Rebind<uint32_t, D> du{};
+  const auto quadrant = BitCast(du, rounded);
+  const auto odd = RebindMask(d, TestBit(quadrant, Set(du, 1u)));
+  const V sign = SignBit(d);
+  const V sin_sign = And(BitCast(d, ShiftLeft<30>(quadrant)), sign);
+  const V next = BitCast(d, ShiftLeft<30>(quadrant + Set(du, 1u)));
+  const V cos_sign = And(next, sign);
+  sin = Xor(Select(odd, c, s), sin_sign);
+  cos = Xor(Select(odd, s, c), cos_sign);
 }
 
 }  // namespace HWY_NAMESPACE
