@@ -1,0 +1,52 @@
+#!/usr/bin/env bash
+# Builds facetwise for this machine and for arm64, and runs every test. See --help.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+usage() {
+  cat <<'EOF'
+Usage: ./test.sh [--long] [--help]
+
+On a Debian 12 machine: installs the packages that are missing, builds the presets `test` (everything,
+build/release) and `arm64` (the library, build/arm64), and runs all tests in one CTest run; those built
+for arm64 run under qemu-aarch64 and are named arm64.*.
+
+  --long   also the tests that take long: the power of the chi-square test at 10^8 samples, and the like
+
+Exit code: 0 if every test passed. CTest's own report is the end of the output.
+EOF
+}
+
+long=
+for argument in "$@"; do
+  case "$argument" in
+    --long) long=1 ;;
+    -h | --help) usage; exit 0 ;;
+    *) echo "test.sh: unknown argument \"$argument\"" >&2; usage >&2; exit 2 ;;
+  esac
+done
+
+mkdir -p out
+logged() {
+  local name=$1
+  shift
+  "$@" > "out/$name.log" 2>&1 || {
+    local code=$?
+    tail -n 40 "out/$name.log" >&2
+    echo "test.sh: $name failed; all of its output is in out/$name.log" >&2
+    exit "$code"
+  }
+}
+
+echo "packages"
+logged install-test cmake/install.sh test
+# arm64 first: the native build includes its tests where they exist.
+echo "build for arm64 (build/arm64)"
+logged configure-arm64 cmake --preset arm64
+logged build-arm64 cmake --build build/arm64
+echo "build (build/release)"
+logged configure-test cmake --preset test
+logged build-test cmake --build build/release
+
+export FACETWISE_LONG=$long
+exec ctest --test-dir build/release --output-on-failure -j2
