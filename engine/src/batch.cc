@@ -39,37 +39,40 @@ struct Plan {
   Tile tile;  // what is the same for every tile
 
   // The columns that there are, by the tile's indices.
-  template <class Column>
-  struct Indexed {
+  struct Input {
     std::size_t index;
-    Column column;
+    const Column<float>* column;
   };
-  Indexed<Column<float>> per_lane[kInputs], one_value[kInputs];
-  Indexed<OutputColumn<float>> out[kOutputs];
+  struct Output {
+    std::size_t index;
+    const OutputColumn<float>* column;
+  };
+  Input per_lane[kInputs], one_value[kInputs];
+  Output out[kOutputs];
   std::size_t per_lane_count = 0, one_value_count = 0, out_count = 0;
   OutputColumn<std::uint8_t> status;
 };
 
-void make_plan(Operation operation, const Batch& const_batch, const KernelTable& table, Plan& plan) {
-  Batch batch = const_batch;
+void make_plan(Operation operation, const Batch& batch, const KernelTable& table, Plan& plan) {
+  const BatchColumns columns(batch);
   plan.table = &table;
   plan.kernel = kernel_for(table, operation, batch.sampler);
   plan.active = batch.active ? batch.active->data() : nullptr;
-  plan.generator = const_batch.generator ? &*const_batch.generator : nullptr;
+  plan.generator = batch.generator ? &*batch.generator : nullptr;
   plan.generates_u3 = plan.generator && uses_u3(batch.sampler);
   for (std::size_t k = 0; k < kInputs; ++k) {
-    const Column<float>& column = input_fields()[k].column(batch);
+    const Column<float>& column = *columns.in[k];
     if (!column.present()) continue;
     if (column.one_value()) {
-      plan.one_value[plan.one_value_count++] = {k, column};
+      plan.one_value[plan.one_value_count++] = {k, &column};
     } else {
-      plan.per_lane[plan.per_lane_count++] = {k, column};
+      plan.per_lane[plan.per_lane_count++] = {k, &column};
     }
   }
   for (std::size_t k = 0; k < kOutputs; ++k) {
-    const OutputColumn<float>& column = output_fields()[k].column(batch);
+    const OutputColumn<float>& column = *columns.out[k];
     if (!column.present()) continue;
-    plan.out[plan.out_count++] = {k, column};
+    plan.out[plan.out_count++] = {k, &column};
     if (k >= kOutMx && k <= kOutIm) plan.tile.wanted |= kWantsNormal;
     if (k == kOutPdf) plan.tile.wanted |= kWantsPdf;
     if (k == kOutWeight) plan.tile.wanted |= kWantsWeight;
@@ -87,7 +90,7 @@ class Stage {
   explicit Stage(const Plan& plan) : plan_(plan), tile_(plan.tile) {
     for (std::size_t c = 0; c < plan.one_value_count; ++c) {
       const auto& [k, column] = plan.one_value[c];
-      std::fill_n(in_[k], kStaged, column[0]);
+      std::fill_n(in_[k], kStaged, *column->data());
       tile_.in[k] = in_[k];
     }
     for (float*& out : tile_.out) out = unwanted_;
@@ -120,15 +123,15 @@ class Stage {
   void load(std::size_t begin, bool in_place) {
     for (std::size_t c = 0; c < plan_.per_lane_count; ++c) {
       const auto& [k, column] = plan_.per_lane[c];
-      const bool contiguous = column.stride() == sizeof(float) && !plan_.active;
+      const bool contiguous = column->stride() == sizeof(float) && !plan_.active;
       if (in_place && contiguous) {
-        tile_.in[k] = column.data() + begin;
+        tile_.in[k] = column->data() + begin;
         continue;
       }
       if (contiguous) {
-        std::copy_n(column.data() + begin, tile_.lanes, in_[k]);
+        std::copy_n(column->data() + begin, tile_.lanes, in_[k]);
       } else {
-        for (std::size_t j = 0; j < tile_.lanes; ++j) in_[k][j] = column[lane_at(begin + j)];
+        for (std::size_t j = 0; j < tile_.lanes; ++j) in_[k][j] = (*column)[lane_at(begin + j)];
       }
       std::fill_n(in_[k] + tile_.lanes, padding(), 0.0f);
       tile_.in[k] = in_[k];
@@ -164,8 +167,8 @@ class Stage {
     bool staged = false;
     for (std::size_t c = 0; c < plan_.out_count; ++c) {
       const auto& [k, column] = plan_.out[c];
-      const bool direct = in_place && column.stride() == sizeof(float);
-      tile_.out[k] = direct ? column.data() + begin : out_[k];
+      const bool direct = in_place && column->stride() == sizeof(float);
+      tile_.out[k] = direct ? column->data() + begin : out_[k];
       staged |= !direct;
     }
     if (plan_.status.present()) {
@@ -180,7 +183,7 @@ class Stage {
     for (std::size_t c = 0; c < plan_.out_count; ++c) {
       const auto& [k, column] = plan_.out[c];
       if (tile_.out[k] != out_[k]) continue;
-      for (std::size_t j = 0; j < tile_.lanes; ++j) column[lane_at(begin + j)] = out_[k][j];
+      for (std::size_t j = 0; j < tile_.lanes; ++j) (*column)[lane_at(begin + j)] = out_[k][j];
     }
     if (tile_.status == status_)
       for (std::size_t j = 0; j < tile_.lanes; ++j) plan_.status[lane_at(begin + j)] = status_[j];
@@ -213,9 +216,12 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
   for_each_range(positions, execution, [&](std::size_t begin, std::size_t end) {
     const FloatEnvironment ieee;
     const Statistics statistics = Stage(plan).run(begin, end);
-    occluded.fetch_add(statistics.occluded, std::memory_order_relaxed);
-    smooth.fetch_add(statistics.smooth, std::memory_order_relaxed);
-    invalid.fetch_add(statistics.invalid, std::memory_order_relaxed);
+    const auto add = [](std::atomic<std::uint64_t>& to, std::uint64_t count) {
+      if (count != 0) to.fetch_add(count, std::memory_order_relaxed);
+    };
+    add(occluded, statistics.occluded);
+    add(smooth, statistics.smooth);
+    add(invalid, statistics.invalid);
   });
   Statistics statistics{.occluded = occluded, .smooth = smooth, .invalid = invalid};
   statistics.accepted = positions - statistics.lanes();

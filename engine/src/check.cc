@@ -1,7 +1,6 @@
 // The checks of a call, made once before anything is read or written.
 #include "src/check.h"
 
-#include <limits>
 #include <numeric>
 #include <string>
 
@@ -21,13 +20,14 @@ std::uintptr_t address(const void* pointer) { return reinterpret_cast<std::uintp
 
 absl::Status check_memory(absl::string_view field, const void* data, std::size_t count, std::size_t stride,
                           std::size_t width) {
-  const std::size_t alignment = width == 1 ? 1 : 4;
   if (count == 0) return absl::OkStatus();
+  const std::size_t misaligned = width == 1 ? 0 : 3;
   if (data == nullptr) return invalid(field, "null pointer");
-  if (address(data) % alignment != 0) return invalid(field, "not aligned to 4 bytes");
-  if (count > 1 && stride % alignment != 0)
-    return invalid(field, absl::StrCat("stride of ", stride, " bytes is not a multiple of 4"));
-  if (count > 1 && stride > static_cast<std::size_t>(std::numeric_limits<std::ptrdiff_t>::max()) / (count - 1))
+  if (address(data) & misaligned) return invalid(field, "not aligned to 4 bytes");
+  if (count == 1) return absl::OkStatus();
+  if (stride & misaligned) return invalid(field, absl::StrCat("stride of ", stride, " bytes is not a multiple of 4"));
+  std::size_t bytes = 0;
+  if (__builtin_mul_overflow(count, stride, &bytes) || address(data) + bytes < address(data))
     return invalid(field, "reaches beyond the address space");
   return absl::OkStatus();
 }
@@ -95,16 +95,17 @@ absl::Status check_choices(Operation operation, const Batch& batch) {
   return absl::OkStatus();
 }
 
-absl::Status check_inputs(Operation operation, Batch& batch) {
+absl::Status check_inputs(Operation operation, const Batch& batch, const BatchColumns& columns) {
   const bool samples = operation == Operation::sample_normal || operation == Operation::sample_reflection;
-  const auto& fields = input_fields();
-  for (std::size_t k = 0; k < fields.size(); ++k) {
-    const absl::string_view field = view(fields[k].name);
-    const Column<float>& column = fields[k].column(batch);
+  const InputField* fields = input_fields().data();
+  for (std::size_t k = 0; k < kInputs; ++k) {
+    const Column<float>& column = *columns.in[k];
     const bool known = fields[k].operations & bit(operation);
+    if (!known && !column.present()) continue;
+    const absl::string_view field = view(fields[k].name);
     const bool random = k >= kU1;
     if (!column.present()) {
-      const bool needed = known && !(random && batch.generator) && !(k == kU3 && !uses_u3(batch.sampler));
+      const bool needed = !(random && batch.generator) && !(k == kU3 && !uses_u3(batch.sampler));
       if (!needed) continue;
       return invalid(field, random ? absl::StrCat("missing: ", view(name(batch.sampler)),
                                                   " needs it unless a generator is given")
@@ -120,34 +121,49 @@ absl::Status check_inputs(Operation operation, Batch& batch) {
   return check_input("generator.id", batch.generator->id, batch.lanes);
 }
 
-absl::Status check_overlap(Batch& batch) {
+absl::Status check_outputs(Operation operation, const Batch& batch, const BatchColumns& columns) {
+  const OutputField* fields = output_fields().data();
+  for (std::size_t k = 0; k < kOutputs; ++k) {
+    const OutputColumn<float>& column = *columns.out[k];
+    if (!column.present()) continue;
+    const absl::string_view field = view(fields[k].name);
+    if (!(fields[k].operations & bit(operation)))
+      return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
+    if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
+  }
+  if (!batch.out.status.present()) return absl::OkStatus();
+  return check_output("out.status", batch.out.status, batch.lanes);
+}
+
+absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
   struct Use {
     absl::string_view field;
     MemoryUse memory;
   };
   Use inputs[kInputs + 2], outputs[kOutputs + 1];
   std::size_t input_count = 0, output_count = 0;
-  for (const InputField& field : input_fields())
-    if (const auto& column = field.column(batch); column.present())
-      inputs[input_count++] = {view(field.name), memory_use(column)};
+  for (std::size_t k = 0; k < kInputs; ++k)
+    if (columns.in[k]->present())
+      inputs[input_count++] = {view(input_fields()[k].name), memory_use(*columns.in[k])};
   if (batch.generator && batch.generator->id.present())
     inputs[input_count++] = {"generator.id", memory_use(batch.generator->id)};
   if (batch.active)
     inputs[input_count++] = {"active", memory_use(batch.active->data(), batch.active->size(), 4, 4)};
-  for (const OutputField& field : output_fields())
-    if (const auto& column = field.column(batch); column.present())
-      outputs[output_count++] = {view(field.name), memory_use(column)};
+  for (std::size_t k = 0; k < kOutputs; ++k)
+    if (columns.out[k]->present())
+      outputs[output_count++] = {view(output_fields()[k].name), memory_use(*columns.out[k])};
   if (batch.out.status.present()) outputs[output_count++] = {"out.status", memory_use(batch.out.status)};
 
   for (std::size_t k = 0; k < output_count; ++k) {
     for (std::size_t j = 0; j < input_count; ++j) {
+      if (!ranges_meet(outputs[k].memory, inputs[j].memory)) continue;
       const bool same_lanes = outputs[k].memory == inputs[j].memory && inputs[j].field != "active";
       if (!same_lanes && share_memory(outputs[k].memory, inputs[j].memory))
         return invalid(outputs[k].field, absl::StrCat("overlaps ", inputs[j].field, ": an output may be an input's ",
                                                       "own lanes or separate memory"));
     }
     for (std::size_t j = 0; j < k; ++j)
-      if (share_memory(outputs[k].memory, outputs[j].memory))
+      if (ranges_meet(outputs[k].memory, outputs[j].memory) && share_memory(outputs[k].memory, outputs[j].memory))
         return invalid(outputs[k].field, absl::StrCat("overlaps ", outputs[j].field));
   }
   return absl::OkStatus();
@@ -155,21 +171,13 @@ absl::Status check_overlap(Batch& batch) {
 
 }  // namespace
 
-absl::Status check(Operation operation, const Batch& const_batch) {
-  Batch batch = const_batch;  // the field tables hand out references to change; nothing is changed
+absl::Status check(Operation operation, const Batch& batch) {
   if (auto status = check_choices(operation, batch); !status.ok()) return status;
   if (auto status = check_active(batch.active, batch.lanes); !status.ok()) return status;
-  if (auto status = check_inputs(operation, batch); !status.ok()) return status;
-  for (const OutputField& field : output_fields()) {
-    const auto& column = field.column(batch);
-    if (!column.present()) continue;
-    if (!(field.operations & bit(operation)))
-      return invalid(view(field.name), absl::StrCat(view(name(operation)), " does not compute it"));
-    if (auto status = check_output(view(field.name), column, batch.lanes); !status.ok()) return status;
-  }
-  if (batch.out.status.present())
-    if (auto status = check_output("out.status", batch.out.status, batch.lanes); !status.ok()) return status;
-  return check_overlap(batch);
+  const BatchColumns columns(batch);
+  if (auto status = check_inputs(operation, batch, columns); !status.ok()) return status;
+  if (auto status = check_outputs(operation, batch, columns); !status.ok()) return status;
+  return check_overlap(batch, columns);
 }
 
 }  // namespace facetwise

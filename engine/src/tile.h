@@ -23,6 +23,19 @@ inline constexpr unsigned kWantsWeight = 4;
 inline constexpr unsigned kWantsShare = 8;
 inline constexpr unsigned kWantsStatus = 16;
 
+// A batch's columns by these indices.
+struct BatchColumns {
+  const Column<float>* in[kInputs];
+  const OutputColumn<float>* out[kOutputs];
+  explicit BatchColumns(const Batch& b)
+      : in{&b.incident.x, &b.incident.y, &b.incident.z, &b.alpha_x, &b.alpha_y, &b.outgoing.x,
+           &b.outgoing.y, &b.outgoing.z, &b.u1,         &b.u2,      &b.u3},
+        out{&b.out.outgoing.x, &b.out.outgoing.y, &b.out.outgoing.z, &b.out.normal.x,
+            &b.out.normal.y,   &b.out.normal.z,   &b.out.incident_dot_normal, &b.out.pdf,
+            &b.out.weight,     &b.out.value,      &b.out.masking, &b.out.projected_area,
+            &b.out.share_unoccluded} {}
+};
+
 // The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and written up to the next
 // multiple of it.
 inline constexpr std::size_t kWidest = 32;
