@@ -8,7 +8,6 @@
 #include "src/parallel.h"
 
 namespace facetwise {
-namespace {
 
 absl::Status check(const Compaction& c) {
   if (auto status = check_active(c.active, c.lanes); !status.ok()) return status;
@@ -46,8 +45,6 @@ absl::Status check(const Compaction& c) {
     if (auto status = separate(field(k, "to"), memory_use(c.columns[k].to), k); !status.ok()) return status;
   return absl::OkStatus();
 }
-
-}  // namespace
 
 absl::StatusOr<std::size_t> compact(const Compaction& c, const Execution& execution) {
   if (auto status = check(c); !status.ok()) return status;

@@ -78,7 +78,8 @@ class Engine {
 
 std::unique_ptr<Engine> local_engine(const Execution& execution = {});
 
-// The checks of run(), without running: OK or the error that run() would return.
+// The checks of run() and compact(), without running: OK or the error that they would return.
 absl::Status check(Operation operation, const Batch& batch);
+absl::Status check(const Compaction& compaction);
 
 }  // namespace facetwise

@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "facetwise/engine.h"
+#include "facetwise/tune_malloc.h"
 
 namespace facetwise {
 
@@ -18,7 +19,7 @@ struct ConnectOptions {
   std::size_t piece_bytes = std::size_t{1} << 20;
   // Pieces in flight at once, over all servers.
   int window = 4;
-  // How long connect() waits for a server, and a call for its answer.
+  // How long connect() waits for a server, and a piece for its answer.
   std::chrono::milliseconds connect_timeout{5000};
   std::chrono::milliseconds call_timeout{60000};
 };
@@ -26,6 +27,11 @@ struct ConnectOptions {
 // Connects to servers; each address is "unix:PATH" or "HOST:PORT". Pieces of a batch go to them in turn;
 // since every server gives the same bits, it does not matter which answers. Unavailable if one does not
 // answer in time.
+//
+// The engine's calls return what the local engine's do. A malformed call gets the same error, from checks
+// made here, before anything is sent or written. A call also fails when a server does: the error begins with
+// "server ADDRESS:", and outputs of pieces that were answered before it are written. Several threads may use
+// one engine. A program that moves much data should call tune_malloc() at its start.
 absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> addresses,
                                                 const ConnectOptions& options = {});
 

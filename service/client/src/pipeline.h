@@ -1,0 +1,35 @@
+// Keeps several calls in flight over the connections, from the calling thread.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "facetwise/client.h"
+#include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/grpcpp.h"
+
+namespace facetwise {
+
+struct Connection {
+  std::string address;
+  std::shared_ptr<grpc::Channel> channel;
+  std::unique_ptr<grpc::GenericStub> stub;
+};
+
+// A batch's way through: pieces are numbered; each becomes a request, and its response is taken apart.
+struct Pieces {
+  std::string method;
+  std::size_t count = 0;
+  std::function<grpc::ByteBuffer(std::size_t piece)> encode;
+  std::function<absl::Status(std::size_t piece, grpc::ByteBuffer& response)> decode;
+};
+
+// Sends the pieces, at most options.window at a time, and takes the responses as they come. The first error
+// ends it: calls in flight are cancelled and waited for.
+absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces);
+
+}  // namespace facetwise

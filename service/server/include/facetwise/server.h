@@ -1,0 +1,71 @@
+// The server: answers the library's calls over gRPC (proto/facetwise/v1/sampler.proto). docs/remote.md says
+// what its users see.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "facetwise/target.h"
+#include "facetwise/tune_malloc.h"
+#include "facetwise/v1/sampler.pb.h"
+
+namespace facetwise {
+
+// Runs the benchmarks that a Benchmark call asks for. Calls `report` after each; when that returns false
+// (the client has gone, or the server drains) it stops early and returns OK. An error becomes the call's.
+// Called on one thread at a time. The request's min_seconds is in (0, 10] or 0, its filter at most 1,000
+// bytes; whether the filter is a regular expression is for the runner to check.
+using BenchmarkReport = std::function<bool(const v1::BenchmarkProgress&)>;
+using BenchmarkRunner = std::function<absl::Status(const v1::BenchmarkRequest&, const BenchmarkReport&)>;
+
+struct ServerOptions {
+  // Where to listen: "unix:PATH" or "HOST:PORT", one or more. Port 0 takes a free one: see addresses().
+  std::vector<std::string> listen;
+  // Permissions of Unix sockets. Who may write to the socket may call.
+  unsigned unix_mode = 0600;
+  // Threads that compute; 0: as many as the machine has.
+  int threads = 0;
+  // Largest request that is read and largest response that is made. A call's lanes are at most a quarter of
+  // it, so that a small request cannot ask for unbounded work.
+  std::size_t max_message_bytes = std::size_t{16} << 20;
+  // Calls (and streams) at once; one more gets RESOURCE_EXHAUSTED.
+  int max_calls = 128;
+  // Bytes of requests and responses held at once; a call that would go above gets RESOURCE_EXHAUSTED.
+  std::size_t max_bytes_in_flight = std::size_t{1} << 30;
+  // How long drain() waits for calls in flight before it ends them.
+  std::chrono::milliseconds drain_timeout{10000};
+  // Which kernels run. Its thread setting is not used.
+  Execution execution;
+  // Benchmark calls are PERMISSION_DENIED unless allowed and a runner is given.
+  bool allow_benchmark = false;
+  BenchmarkRunner benchmark;
+};
+
+class Server {
+ public:
+  // Listens and answers from now on. InvalidArgument for options that mean nothing; Unavailable, naming the
+  // address, where it cannot listen (another server has the Unix socket or the port).
+  static absl::StatusOr<std::unique_ptr<Server>> start(const ServerOptions& options);
+  virtual ~Server() = default;  // drains
+
+  // The addresses that it listens on, as clients name them: port 0 replaced by the one taken.
+  virtual std::span<const std::string> addresses() const = 0;
+  // Returns when the server has drained.
+  virtual void wait() = 0;
+  // Health says NOT_SERVING, no new calls are taken, those in flight finish (until drain_timeout, then they
+  // are cancelled). Returns when all is done. Any thread may call it, more than once.
+  virtual void drain() = 0;
+};
+
+// A server process: starts, calls `ready`, serves until SIGTERM or SIGINT, drains. OK then; a second signal
+// ends the process at once. Also tunes malloc for large messages (tune_malloc).
+absl::Status serve(const ServerOptions& options, const std::function<void(const Server&)>& ready = {});
+
+}  // namespace facetwise

@@ -1,0 +1,334 @@
+// Run and RunStream: the request's columns are read to where the engine reads them, and the engine writes
+// the response's columns where gRPC sends them from.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "facetwise/engine.h"
+#include "src/call.h"
+#include "wire/fields.h"
+#include "wire/message_reader.h"
+#include "wire/message_writer.h"
+
+namespace facetwise {
+namespace {
+
+using wire::MessageReader;
+using Request = v1::BatchRequest;
+
+constexpr std::size_t kAlignment = 64;
+constexpr std::size_t kInputs = 11;
+
+absl::string_view view(std::string_view text) { return {text.data(), text.size()}; }
+
+// A column of the request: bytes in the decoder's block.
+struct Bytes {
+  const char* data = nullptr;
+  std::size_t size = 0;
+};
+
+class Decoder {
+ public:
+  // Every column is in the message once, so its size and the alignment of each bound the memory.
+  explicit Decoder(grpc::ByteBuffer& message)
+      : reader_(message), block_(message.Length() + (kInputs + 1) * kAlignment) {}
+
+  absl::Status read();
+  absl::Status make_batch(const Limits& limits, Batch& batch);
+
+  std::uint64_t lanes() const { return lanes_; }
+  Operation operation() const { return *operation_; }
+  unsigned outputs() const { return outputs_; }
+
+ private:
+  absl::Status read_field(const MessageReader::Field& field);
+  absl::Status read_model(std::size_t bytes);
+  absl::Status read_direction(int field, std::size_t bytes);
+  absl::Status read_generator(std::size_t bytes);
+  absl::Status read_outputs(const MessageReader::Field& field);
+  absl::Status read_column(absl::string_view name, std::size_t width, const MessageReader::Field& field, Bytes& column);
+  absl::Status read_enum(const MessageReader::Field& field, int& value);
+  absl::Status add_output(std::uint64_t value);
+  // Calls read(field) for each field of the message, or of its next `bytes` bytes.
+  template <class Read>
+  absl::Status each_field(const Read& read);
+  template <class Read>
+  absl::Status each_field_inside(std::size_t bytes, const Read& read);
+
+  MessageReader reader_;
+  wire::Block block_;
+  std::size_t at_ = 0;
+
+  int operation_value_ = 0, distribution_ = 0, masking_ = 0, shadowing_ = 0, sampler_ = 0;
+  std::optional<Operation> operation_;
+  std::uint64_t lanes_ = 0;
+  unsigned outputs_ = 0;
+  std::array<Bytes, kInputs> inputs_;
+  bool has_generator_ = false;
+  Generator generator_;
+  Bytes generator_id_;
+};
+
+template <class Read>
+absl::Status Decoder::each_field(const Read& read) {
+  while (const auto field = reader_.next())
+    if (auto status = read(*field); !status.ok()) return status;
+  return reader_.finished() ? absl::OkStatus() : damaged_message();
+}
+
+template <class Read>
+absl::Status Decoder::each_field_inside(std::size_t bytes, const Read& read) {
+  absl::Status status;
+  const bool good = reader_.inside(bytes, [&] {
+    status = each_field(read);
+    return status.ok();
+  });
+  if (!status.ok()) return status;
+  return good ? absl::OkStatus() : damaged_message();
+}
+
+absl::Status Decoder::read() {
+  return each_field([this](const MessageReader::Field& field) { return read_field(field); });
+}
+
+absl::Status Decoder::read_field(const MessageReader::Field& field) {
+  std::size_t bytes = 0;
+  switch (field.number) {
+    case Request::kOperationFieldNumber: return read_enum(field, operation_value_);
+    case Request::kSamplerFieldNumber: return read_enum(field, sampler_);
+    case Request::kLanesFieldNumber: return reader_.varint(field, lanes_) ? absl::OkStatus() : damaged_message();
+    case Request::kOutputsFieldNumber: return read_outputs(field);
+    case Request::kModelFieldNumber:
+      return reader_.length(field, bytes) ? read_model(bytes) : damaged_message();
+    case Request::kGeneratorFieldNumber:
+      return reader_.length(field, bytes) ? read_generator(bytes) : damaged_message();
+    case Request::kIncidentFieldNumber:
+    case Request::kOutgoingFieldNumber:
+      return reader_.length(field, bytes) ? read_direction(field.number, bytes) : damaged_message();
+    default: break;
+  }
+  const auto places = wire::input_places();
+  for (std::size_t k = 0; k < places.size(); ++k)
+    if (places[k].field == field.number) return read_column(view(places[k].name), 4, field, inputs_[k]);
+  return reader_.skip(field) ? absl::OkStatus() : damaged_message();
+}
+
+absl::Status Decoder::read_enum(const MessageReader::Field& field, int& value) {
+  std::uint64_t wide = 0;
+  if (!reader_.varint(field, wide)) return damaged_message();
+  // An enumeration is 32 bits, sign-extended on the wire.
+  value = static_cast<int>(static_cast<std::uint32_t>(wide));
+  return absl::OkStatus();
+}
+
+absl::Status Decoder::read_model(std::size_t bytes) {
+  return each_field_inside(bytes, [this](const MessageReader::Field& field) {
+    switch (field.number) {
+      case v1::Model::kDistributionFieldNumber: return read_enum(field, distribution_);
+      case v1::Model::kMaskingFieldNumber: return read_enum(field, masking_);
+      case v1::Model::kShadowingFieldNumber: return read_enum(field, shadowing_);
+      default: return reader_.skip(field) ? absl::OkStatus() : damaged_message();
+    }
+  });
+}
+
+absl::Status Decoder::read_direction(int direction, std::size_t bytes) {
+  return each_field_inside(bytes, [&](const MessageReader::Field& field) {
+    const auto places = wire::input_places();
+    for (std::size_t k = 0; k < places.size(); ++k)
+      if (places[k].field == direction && places[k].part == field.number)
+        return read_column(view(places[k].name), 4, field, inputs_[k]);
+    return reader_.skip(field) ? absl::OkStatus() : damaged_message();
+  });
+}
+
+absl::Status Decoder::read_generator(std::size_t bytes) {
+  has_generator_ = true;
+  return each_field_inside(bytes, [this](const MessageReader::Field& field) {
+    std::uint64_t value = 0;
+    bool good = true;
+    switch (field.number) {
+      case v1::Generator::kSeedFieldNumber: good = reader_.eight_bytes(field, generator_.seed); break;
+      case v1::Generator::kFirstIdFieldNumber: good = reader_.varint(field, generator_.first_id); break;
+      case v1::Generator::kDimensionFieldNumber:
+        good = reader_.varint(field, value);
+        generator_.dimension = static_cast<std::uint32_t>(value);
+        break;
+      case v1::Generator::kIdFieldNumber: return read_column("generator.id", 8, field, generator_id_);
+      default: good = reader_.skip(field);
+    }
+    return good ? absl::OkStatus() : damaged_message();
+  });
+}
+
+// Packed or one by one: protobuf allows both.
+absl::Status Decoder::read_outputs(const MessageReader::Field& field) {
+  std::uint64_t value = 0;
+  if (reader_.varint(field, value)) return add_output(value);
+  std::size_t bytes = 0;
+  if (!reader_.length(field, bytes)) return damaged_message();
+  absl::Status status;
+  const bool good = reader_.inside(bytes, [&] {
+    while (status.ok() && !reader_.at_end()) {
+      if (!reader_.packed_varint(value)) return false;
+      status = add_output(value);
+    }
+    return status.ok();
+  });
+  if (!status.ok()) return status;
+  return good ? absl::OkStatus() : damaged_message();
+}
+
+absl::Status Decoder::add_output(std::uint64_t value) {
+  if (value == v1::OUTPUT_UNSPECIFIED) return invalid_field("outputs", "holds OUTPUT_UNSPECIFIED");
+  if (value > static_cast<std::uint64_t>(v1::Output_MAX))
+    return invalid_field("outputs", absl::StrCat("unknown value ", static_cast<std::int64_t>(value)));
+  outputs_ |= 1u << value;
+  return absl::OkStatus();
+}
+
+absl::Status Decoder::read_column(absl::string_view name, std::size_t width, const MessageReader::Field& field,
+                                  Bytes& column) {
+  std::size_t bytes = 0;
+  if (!reader_.length(field, bytes)) return damaged_message();
+  if (column.data != nullptr) return invalid_field(name, "given twice");
+  if (bytes % width != 0)
+    return invalid_field(name, absl::StrCat(bytes, " bytes are not whole values of ", width, " bytes"));
+  at_ = (at_ + kAlignment - 1) / kAlignment * kAlignment;
+  char* data = block_.data() + at_;
+  if (!reader_.read(data, bytes)) return damaged_message();
+  at_ += bytes;
+  column = {data, bytes};
+  return absl::OkStatus();
+}
+
+// The wire's own checks; the rest is for the engine's.
+absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
+  const auto unknown = [](absl::string_view field, int value) {
+    return invalid_field(field, absl::StrCat("unknown value ", value));
+  };
+  if (operation_value_ == v1::OPERATION_UNSPECIFIED) return invalid_field("operation", "missing");
+  operation_ = wire::operation_from(operation_value_);
+  if (!operation_) return unknown("operation", operation_value_);
+  const auto distribution = wire::distribution_from(distribution_);
+  const auto masking = wire::masking_from(masking_);
+  const auto shadowing = wire::shadowing_from(shadowing_);
+  const auto sampler = wire::sampler_from(sampler_, *operation_);
+  if (!distribution) return unknown("model.distribution", distribution_);
+  if (!masking) return unknown("model.masking", masking_);
+  if (!shadowing) return unknown("model.shadowing", shadowing_);
+  if (!sampler) return unknown("sampler", sampler_);
+  if (auto status = check_lanes(lanes_, limits); !status.ok()) return status;
+  if (const unsigned strange = outputs_ & ~wire::outputs_of(*operation_); strange != 0) {
+    const auto output = static_cast<v1::Output>(std::countr_zero(strange));
+    return invalid_field("outputs", absl::StrCat(view(name(*operation_)), " does not compute ", v1::Output_Name(output)));
+  }
+
+  batch.model = {*distribution, *masking, *shadowing};
+  batch.sampler = *sampler;
+  batch.lanes = lanes_;
+  // An empty column is an absent one, except in an empty batch, whose columns are all empty.
+  static constexpr std::uint64_t kNothing = 0;
+  const auto fields = input_fields();
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const Bytes& column = inputs_[k];
+    const bool random = fields[k].name.front() == 'u';
+    const bool expected = (fields[k].operations & bit(*operation_)) && !(random && has_generator_);
+    if (column.size > 0)
+      fields[k].column(batch) = {reinterpret_cast<const float*>(column.data), column.size / 4};
+    else if (lanes_ == 0 && expected)
+      fields[k].column(batch) = {reinterpret_cast<const float*>(&kNothing), 0};
+  }
+  if (has_generator_) {
+    if (generator_id_.size > 0)
+      generator_.id = {reinterpret_cast<const std::uint64_t*>(generator_id_.data), generator_id_.size / 8};
+    batch.generator = generator_;
+  }
+  return absl::OkStatus();
+}
+
+// The response's columns, in the message that will be sent.
+class Response {
+ public:
+  Response(unsigned outputs, std::size_t lanes) : outputs_(outputs), lanes_(lanes) {}
+
+  std::size_t bytes() const {
+    std::size_t bytes = asks_for(v1::STATUS) ? lanes_ : 0;
+    for (const auto& place : wire::output_places())
+      if (asks_for(place.output)) bytes += lanes_ * 4;
+    return bytes;
+  }
+
+  wire::MessageWriter make(Batch& batch) const {
+    wire::MessageWriter writer(kMostColumns, bytes(), kStatisticsBytes, true);
+    const auto places = wire::output_places();
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      if (!asks_for(places[k].output)) continue;
+      const int part = places[k].part;
+      if (part == 1) writer.begin(places[k].field, 3 * wire::MessageWriter::field_bytes(lanes_ * 4));
+      char* column = writer.column(part == 0 ? places[k].field : part, lanes_ * 4);
+      output_fields()[k].column(batch) = {reinterpret_cast<float*>(column), lanes_};
+    }
+    if (asks_for(v1::STATUS)) {
+      char* column = writer.column(v1::BatchResponse::kStatusFieldNumber, lanes_);
+      batch.out.status = {reinterpret_cast<std::uint8_t*>(column), lanes_};
+    }
+    return writer;
+  }
+
+ private:
+  static constexpr std::size_t kMostColumns = 14;
+  static constexpr std::size_t kStatisticsBytes = 64;
+  bool asks_for(v1::Output output) const { return outputs_ & (1u << output); }
+
+  unsigned outputs_;
+  std::size_t lanes_;
+};
+
+}  // namespace
+
+absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const CallTools& tools) {
+  // Received, decoded.
+  if (auto status = tools.ticket.hold(2 * request.Length()); !status.ok()) return status;
+  Decoder decoder(request);
+  Batch batch;
+  if (auto status = decoder.read(); !status.ok()) return status;
+  request.Clear();
+  if (auto status = decoder.make_batch(tools.limits, batch); !status.ok()) return status;
+
+  const Response response(decoder.outputs(), decoder.lanes());
+  if (response.bytes() > tools.limits.message_bytes)
+    return absl::ResourceExhaustedError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
+                                                     " lanes are above the limit of ", tools.limits.message_bytes,
+                                                     ": send fewer lanes"));
+  if (auto status = tools.ticket.hold(response.bytes()); !status.ok()) return status;
+  wire::MessageWriter writer = response.make(batch);
+  const auto statistics = tools.compute.run(tools.admission.calls(), [&](const Execution& execution) {
+    return run(decoder.operation(), batch, execution);
+  });
+  if (!statistics.ok()) return statistics.status();
+
+  v1::Statistics counts;
+  counts.set_accepted(statistics->accepted);
+  counts.set_occluded(statistics->occluded);
+  counts.set_smooth(statistics->smooth);
+  counts.set_invalid(statistics->invalid);
+  writer.message(v1::BatchResponse::kStatisticsFieldNumber, counts);
+  return std::move(writer).finish();
+}
+
+absl::Status invalid_field(absl::string_view field, absl::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat(field, ": ", what));
+}
+
+absl::Status damaged_message() { return absl::InvalidArgumentError("message: truncated or damaged"); }
+
+absl::Status check_lanes(std::uint64_t lanes, const Limits& limits) {
+  if (lanes <= limits.lanes()) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrCat("lanes: ", lanes, " are above the limit of ", limits.lanes(), ": send them in several calls"));
+}
+
+}  // namespace facetwise

@@ -1,0 +1,10 @@
+#pragma once
+
+#include <string>
+
+namespace facetwise {
+
+// The processor's name as the kernel tells it, or "unknown".
+std::string cpu_name();
+
+}  // namespace facetwise

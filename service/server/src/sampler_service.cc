@@ -1,0 +1,132 @@
+#include "src/sampler_service.h"
+
+#include "absl/strings/str_cat.h"
+#include "facetwise/engine.h"
+#include "src/machine.h"
+#include "wire/status.h"
+
+namespace facetwise {
+namespace {
+
+using grpc::internal::RpcMethod;
+using grpc::internal::RpcServiceMethod;
+using wire::to_grpc;
+
+grpc::Status error(grpc::StatusCode code, const std::string& message) { return {code, message}; }
+
+}  // namespace
+
+SamplerService::SamplerService(const ServerOptions& options)
+    : options_(options),
+      limits_{options.max_message_bytes},
+      admission_(options.max_calls, options.max_bytes_in_flight),
+      compute_(options.threads, options.execution) {
+  add_unary("/facetwise.v1.Sampler/Run", answer_batch);
+  add_stream("/facetwise.v1.Sampler/RunStream", answer_batch);
+  add_unary("/facetwise.v1.Sampler/Compact", answer_compact);
+  add_stream("/facetwise.v1.Sampler/CompactStream", answer_compact);
+  AddMethod(new RpcServiceMethod(
+      "/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
+      new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
+          [](SamplerService* service, grpc::ServerContext*, const v1::InfoRequest*, v1::InfoResponse* response) {
+            return service->info(*response);
+          },
+          this)));
+  AddMethod(new RpcServiceMethod(
+      "/facetwise.v1.Sampler/Benchmark", RpcMethod::SERVER_STREAMING,
+      new grpc::internal::ServerStreamingHandler<SamplerService, v1::BenchmarkRequest, v1::BenchmarkProgress>(
+          [](SamplerService* service, grpc::ServerContext* context, const v1::BenchmarkRequest* request,
+             grpc::ServerWriter<v1::BenchmarkProgress>* writer) {
+            return service->benchmark(*context, *request, *writer);
+          },
+          this)));
+}
+
+void SamplerService::add_unary(const char* name, Answer answer) {
+  AddMethod(new RpcServiceMethod(
+      name, RpcMethod::NORMAL_RPC,
+      new grpc::internal::RpcMethodHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
+          [answer](SamplerService* service, grpc::ServerContext* context, const grpc::ByteBuffer* request,
+                   grpc::ByteBuffer* response) {
+            // The handler's own object: emptied as soon as it is read.
+            return service->unary(answer, *context, const_cast<grpc::ByteBuffer&>(*request), *response);
+          },
+          this)));
+}
+
+void SamplerService::add_stream(const char* name, Answer answer) {
+  AddMethod(new RpcServiceMethod(
+      name, RpcMethod::BIDI_STREAMING,
+      new grpc::internal::BidiStreamingHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
+          [answer](SamplerService* service, grpc::ServerContext* context, Stream* stream) {
+            return service->stream(answer, *context, *stream);
+          },
+          this)));
+}
+
+grpc::Status SamplerService::unary(Answer answer, grpc::ServerContext& context, grpc::ByteBuffer& request,
+                                   grpc::ByteBuffer& response) {
+  Admission::Ticket ticket(admission_);
+  if (!ticket.status().ok()) return to_grpc(ticket.status());
+  if (context.IsCancelled()) return grpc::Status::CANCELLED;
+  auto answered = answer(request, {limits_, compute_, admission_, ticket});
+  if (!answered.ok()) return to_grpc(answered.status());
+  response.Swap(&*answered);
+  return grpc::Status::OK;
+}
+
+grpc::Status SamplerService::stream(Answer answer, grpc::ServerContext& context, Stream& stream) {
+  Admission::Ticket ticket(admission_);
+  if (!ticket.status().ok()) return to_grpc(ticket.status());
+  for (grpc::ByteBuffer request; stream.Read(&request);) {
+    if (context.IsCancelled()) return grpc::Status::CANCELLED;
+    auto answered = answer(request, {limits_, compute_, admission_, ticket});
+    if (!answered.ok()) return to_grpc(answered.status());
+    if (!stream.Write(*answered)) return grpc::Status::CANCELLED;  // the client has gone
+    ticket.release();
+    if (admission_.closed()) return error(grpc::StatusCode::UNAVAILABLE, "the server is shutting down");
+  }
+  return grpc::Status::OK;
+}
+
+grpc::Status SamplerService::info(v1::InfoResponse& response) {
+  const std::string_view release = version();
+  response.set_version(std::string(release));
+  response.set_target(std::string(name(resolve(compute_.execution().target).value_or(Target::best))));
+  for (const Target target : available_targets()) response.add_available_targets(std::string(name(target)));
+  response.set_threads(compute_.threads());
+  response.set_max_message_bytes(options_.max_message_bytes);
+  static const std::string cpu = cpu_name();
+  response.set_cpu(cpu);
+  response.set_benchmark_allowed(options_.allow_benchmark && options_.benchmark);
+  return grpc::Status::OK;
+}
+
+grpc::Status SamplerService::benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
+                                       grpc::ServerWriter<v1::BenchmarkProgress>& writer) {
+  constexpr std::size_t kLongestFilter = 1000;
+  if (!options_.allow_benchmark || !options_.benchmark)
+    return error(grpc::StatusCode::PERMISSION_DENIED, "benchmarks are off: start the server with --allow-benchmark");
+  if (request.filter().size() > kLongestFilter)
+    return error(grpc::StatusCode::INVALID_ARGUMENT,
+                 absl::StrCat("filter: ", request.filter().size(), " bytes, at most ", kLongestFilter));
+  if (const double s = request.min_seconds(); s != 0 && !(s > 0 && s <= 10))
+    return error(grpc::StatusCode::INVALID_ARGUMENT, absl::StrCat("min_seconds: ", s, " is not in (0, 10], nor 0"));
+  Admission::Ticket ticket(admission_);
+  if (!ticket.status().ok()) return to_grpc(ticket.status());
+  if (benchmark_runs_.exchange(true))
+    return error(grpc::StatusCode::RESOURCE_EXHAUSTED, "another benchmark runs: try again later");
+  struct Done {
+    std::atomic<bool>& runs;
+    ~Done() { runs = false; }
+  } done{benchmark_runs_};
+  const absl::Status status = options_.benchmark(request, [&](const v1::BenchmarkProgress& progress) {
+    return !admission_.closed() && !context.IsCancelled() && writer.Write(progress);
+  });
+  if (!status.ok()) return to_grpc(status);
+  if (context.IsCancelled()) return grpc::Status::CANCELLED;
+  if (admission_.closed()) return error(grpc::StatusCode::UNAVAILABLE, "the server is shutting down");
+  return grpc::Status::OK;
+}
+
+}  // namespace facetwise

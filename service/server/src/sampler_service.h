@@ -1,0 +1,48 @@
+// facetwise.v1.Sampler.
+#pragma once
+
+#include <atomic>
+
+#include "facetwise/server.h"
+#include "facetwise/v1/sampler.pb.h"
+#include "grpcpp/impl/codegen/proto_utils.h"
+#include "grpcpp/impl/service_type.h"
+#include "grpcpp/server_context.h"
+#include "grpcpp/support/byte_buffer.h"
+#include "grpcpp/support/method_handler.h"
+#include "grpcpp/support/sync_stream.h"
+#include "src/admission.h"
+#include "src/call.h"
+#include "src/compute.h"
+
+namespace facetwise {
+
+// The calls that move columns are handled as bytes, so that columns are read and written in place; the rest
+// are generated messages. Registers itself as generated code does, since that has no synchronous raw calls.
+class SamplerService final : public grpc::Service {
+ public:
+  explicit SamplerService(const ServerOptions& options);
+
+  Admission& admission() { return admission_; }
+
+ private:
+  using Stream = grpc::ServerReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>;
+  using Answer = absl::StatusOr<grpc::ByteBuffer> (*)(grpc::ByteBuffer&, const CallTools&);
+
+  void add_unary(const char* name, Answer answer);
+  void add_stream(const char* name, Answer answer);
+  grpc::Status unary(Answer answer, grpc::ServerContext& context, grpc::ByteBuffer& request,
+                     grpc::ByteBuffer& response);
+  grpc::Status stream(Answer answer, grpc::ServerContext& context, Stream& stream);
+  grpc::Status info(v1::InfoResponse& response);
+  grpc::Status benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
+                         grpc::ServerWriter<v1::BenchmarkProgress>& writer);
+
+  const ServerOptions options_;
+  const Limits limits_;
+  Admission admission_;
+  Compute compute_;
+  std::atomic<bool> benchmark_runs_{false};
+};
+
+}  // namespace facetwise

@@ -1,0 +1,152 @@
+#include "facetwise/server.h"
+
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <condition_variable>
+#include <cstring>
+#include <mutex>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+#include "grpc/grpc.h"
+#include "grpcpp/ext/proto_server_reflection_plugin.h"
+#include "grpcpp/grpcpp.h"
+#include "grpcpp/health_check_service_interface.h"
+#include "grpcpp/resource_quota.h"
+#include "src/listen.h"
+#include "src/sampler_service.h"
+
+namespace facetwise {
+namespace {
+
+// Calls that are none of ours (a health watch, a reflection stream) have this long when ours are done.
+constexpr std::chrono::milliseconds kLinger{500};
+
+absl::Status check_options(const ServerOptions& options) {
+  const auto invalid = [](absl::string_view what) { return absl::InvalidArgumentError(what); };
+  if (options.listen.empty()) return invalid("listen: no address given: unix:PATH or HOST:PORT");
+  for (const std::string& address : options.listen)
+    if (auto status = check_address(address); !status.ok()) return status;
+  if (options.unix_mode > 0777) return invalid("unix_mode: not permissions");
+  if (options.threads < 0) return invalid("threads: below 0");
+  if (options.max_message_bytes < 4096 || options.max_message_bytes > std::size_t{1} << 30)
+    return invalid("max_message_bytes: not from 4 KiB to 1 GiB");
+  if (options.max_calls < 1) return invalid("max_calls: below 1");
+  if (options.max_bytes_in_flight < options.max_message_bytes)
+    return invalid("max_bytes_in_flight: below max_message_bytes");
+  if (!resolve(options.execution.target))
+    return absl::FailedPreconditionError(absl::StrCat("target: this CPU or build has no ",
+                                                      std::string(name(options.execution.target))));
+  return absl::OkStatus();
+}
+
+class GrpcServer final : public Server {
+ public:
+  explicit GrpcServer(const ServerOptions& options) : options_(options), service_(options) {}
+  ~GrpcServer() override { drain(); }
+
+  absl::Status listen();
+
+  std::span<const std::string> addresses() const override { return addresses_; }
+  void wait() override {
+    server_->Wait();
+    const std::lock_guard lock(drain_mutex_);
+  }
+  void drain() override;
+
+ private:
+  const ServerOptions options_;
+  SamplerService service_;
+  std::vector<SocketLock> sockets_;
+  std::vector<std::string> addresses_;
+  std::mutex drain_mutex_;
+  bool drained_ = false;
+  std::unique_ptr<grpc::Server> server_;  // goes first
+};
+
+absl::Status GrpcServer::listen() {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  builder.RegisterService(&service_);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(options_.max_message_bytes));
+  builder.SetMaxSendMessageSize(-1);  // answer_batch() keeps responses below the limit
+  // Two servers on one port would share its connections without a word.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options_.max_calls + 16);
+  // A synchronous server has one thread per call; what is above our own limit on calls is for health checks,
+  // reflection, and for saying no.
+  grpc::ResourceQuota quota;
+  quota.SetMaxThreads(options_.max_calls + 64);
+  builder.SetResourceQuota(quota);
+
+  std::vector<int> ports(options_.listen.size(), -1);
+  bool any_unix = false;
+  for (std::size_t k = 0; k < options_.listen.size(); ++k) {
+    const std::string& address = options_.listen[k];
+    if (const std::string path = unix_path(address); !path.empty()) {
+      any_unix = true;
+      auto lock = SocketLock::take(path);
+      if (!lock.ok()) return lock.status();
+      sockets_.push_back(*std::move(lock));
+    }
+    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &ports[k]);
+  }
+
+  // Sockets are made for nobody else first, so that nobody slips in before they have their permissions.
+  const mode_t mask = any_unix ? umask(0177) : 0;
+  server_ = builder.BuildAndStart();
+  if (any_unix) umask(mask);
+  for (std::size_t k = 0; k < ports.size(); ++k) {
+    const std::string& address = options_.listen[k];
+    if (ports[k] <= 0)
+      return absl::UnavailableError(
+          absl::StrCat(address, ": cannot listen there: in use, not allowed, or not an address of this machine"));
+    const std::string path = unix_path(address);
+    if (!path.empty() && chmod(path.c_str(), options_.unix_mode) != 0)
+      return absl::UnavailableError(absl::StrCat(address, ": cannot set its permissions: ", std::strerror(errno)));
+    addresses_.push_back(path.empty() ? with_port(address, ports[k]) : address);
+  }
+  if (!server_) return absl::UnavailableError("listen: the server could not start");
+  server_->GetHealthCheckService()->SetServingStatus("facetwise.v1.Sampler", true);
+  return absl::OkStatus();
+}
+
+void GrpcServer::drain() {
+  const std::lock_guard lock(drain_mutex_);
+  if (drained_ || !server_) return;
+  drained_ = true;
+  const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
+  server_->GetHealthCheckService()->SetServingStatus(false);
+  service_.admission().close();
+  // Refuses connections and new calls at once, then waits for all calls, health watches as well.
+  std::thread shutdown([&] { server_->Shutdown(std::chrono::system_clock::now() + options_.drain_timeout); });
+  service_.admission().wait_until_idle(until);
+  std::mutex mutex;
+  std::condition_variable done;
+  bool ended = false;
+  std::thread ender([&] {
+    std::unique_lock wait(mutex);
+    if (!done.wait_for(wait, kLinger, [&] { return ended; })) grpc_server_cancel_all_calls(server_->c_server());
+  });
+  shutdown.join();
+  {
+    const std::lock_guard end(mutex);
+    ended = true;
+  }
+  done.notify_all();
+  ender.join();
+  sockets_.clear();
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Server>> Server::start(const ServerOptions& options) {
+  if (auto status = check_options(options); !status.ok()) return status;
+  auto server = std::make_unique<GrpcServer>(options);
+  if (auto status = server->listen(); !status.ok()) return status;
+  return server;
+}
+
+}  // namespace facetwise

@@ -1,0 +1,51 @@
+// A server process for the tests: the library's serve() with its limits as flags. Prints each address that it
+// listens on, then "ready". Its Benchmark call answers with made-up results, slowly, so that tests can watch.
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "CLI/CLI.hpp"
+#include "facetwise/server.h"
+
+namespace {
+
+// Reports the request's filter as the operation, `total` times.
+absl::Status report_steps(const facetwise::v1::BenchmarkRequest& request, const facetwise::BenchmarkReport& report) {
+  if (request.filter() == "fail") return absl::InvalidArgumentError("filter: the runner says no");
+  const unsigned total = request.filter() == "long" ? 1000 : 3;
+  for (unsigned k = 1; k <= total; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    facetwise::v1::BenchmarkProgress progress;
+    progress.set_done(k);
+    progress.set_total(total);
+    progress.mutable_result()->set_operation(request.filter());
+    if (!report(progress)) return absl::OkStatus();
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  facetwise::ServerOptions options;
+  long drain_ms = 10000;
+  CLI::App app("facetwise server for tests");
+  app.add_option("--listen", options.listen)->required();
+  app.add_option("--threads", options.threads);
+  app.add_option("--max-message-bytes", options.max_message_bytes);
+  app.add_option("--max-calls", options.max_calls);
+  app.add_option("--max-bytes-in-flight", options.max_bytes_in_flight);
+  app.add_option("--drain-ms", drain_ms);
+  app.add_flag("--allow-benchmark", options.allow_benchmark);
+  CLI11_PARSE(app, argc, argv);
+  options.drain_timeout = std::chrono::milliseconds(drain_ms);
+  options.benchmark = report_steps;
+  const absl::Status status = facetwise::serve(options, [](const facetwise::Server& server) {
+    for (const std::string& address : server.addresses()) std::printf("%s\n", address.c_str());
+    std::printf("ready\n");
+    std::fflush(stdout);
+  });
+  if (status.ok()) return 0;
+  std::fprintf(stderr, "%s\n", std::string(status.message()).c_str());
+  return 1;
+}
