@@ -22,6 +22,7 @@ inline constexpr float kRim = 0x1p-30f;
 template <class D>
 struct Cone {
   using V = Vec<D>;
+  HWY_INLINE Cone() {}
   V lambda;                  // the form's positive eigenvalue
   V inverse_p, inverse_q;    // 1 / (lambda + i_z ax^2), 1 / (lambda + i_z ay^2)
   V vx, vy;                  // the axis (v_x, v_y, 1)

@@ -26,6 +26,7 @@ inline constexpr float kSmallestA = 0x1p-50f;
 template <class D>
 struct Incident {
   using V = Vec<D>;
+  HWY_INLINE Incident() {}
   V x, y, z;
   V ax, ay;
   V wx, wy;

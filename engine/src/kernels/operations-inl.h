@@ -20,6 +20,7 @@ namespace HWY_NAMESPACE {
 template <class D>
 struct Policy {
   Mask<D> valid, smooth;  // smooth lanes are valid
+  HWY_INLINE Policy() {}
 };
 
 template <class D, class V = Vec<D>>

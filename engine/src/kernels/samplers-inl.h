@@ -29,6 +29,7 @@ inline constexpr float kSmallestIm = 0x1p-100f;
 template <class D>
 struct Drawn {
   using V = Vec<D>;
+  HWY_INLINE Drawn() {}
   V mx, my, mz;  // M
   V mm;          // M . M
   V im;          // i . M = w . m_hat

@@ -32,9 +32,12 @@ template <class D>
 struct Twice {
   D d;
 };
+// Constructors of structs with vectors are written out: implicit ones would not be compiled for the target.
 template <class V>
 struct Pair {
   V a, b;
+  HWY_INLINE Pair() {}
+  HWY_INLINE Pair(V first, V second) : a(first), b(second) {}
 };
 
 template <class D>

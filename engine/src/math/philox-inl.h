@@ -93,13 +93,10 @@ void Philox(const PhiloxTile& tile) {
         even_id = hn::ConcatEven(d64, b, a);
         odd_id = hn::ConcatOdd(d64, b, a);
       }
-      PhiloxWide<decltype(d64)> even, odd;
-      even.c0 = even_id;
-      even.c1 = hn::ShiftRight<32>(even_id);
-      odd.c0 = odd_id;
-      odd.c1 = hn::ShiftRight<32>(odd_id);
-      even.c2 = odd.c2 = hn::Set(d64, uint64_t{tile.dimension});
-      even.c3 = odd.c3 = hn::Zero(d64);
+      const auto c2 = hn::Set(d64, uint64_t{tile.dimension});
+      const auto c3 = hn::Zero(d64);
+      PhiloxWide<decltype(d64)> even{even_id, hn::ShiftRight<32>(even_id), c2, c3};
+      PhiloxWide<decltype(d64)> odd{odd_id, hn::ShiftRight<32>(odd_id), c2, c3};
       even.Rounds(d64, tile.seed);
       odd.Rounds(d64, tile.seed);
       if (tile.u[0] != nullptr) StoreUniform(d, even.c0, odd.c0, tile.u[0] + lane);
