@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// The smallest o_z, m_hat_z and i.M / lambda that `exact` returns for i_z > 0: rounding puts a few samples in a
+// The smallest o_z and m_hat_z that `exact` returns for i_z > 0: rounding puts a few samples in a
 // million on the wrong side of the rim they were drawn inside of, and these are raised to it.
 inline constexpr float kRim = 0x1p-30f;
 
@@ -24,24 +24,37 @@ struct Cone {
   using V = Vec<D>;
   HWY_INLINE Cone() {}
   V lambda;                  // the form's positive eigenvalue
-  V inverse_p, inverse_q;    // 1 / (lambda + i_z ax^2), 1 / (lambda + i_z ay^2)
+  V px, py;                  // i_z ax^2, i_z ay^2
+  V inverse_p, inverse_q;    // 1/P, 1/Q: P = lambda + px, Q = lambda + py
   V vx, vy;                  // the axis (v_x, v_y, 1)
   V inverse_n2;              // 1 / v.v
   V two_k;                   // 2 K = 2 lambda^2 / (n2 sqrt(P Q))
 };
 
-// One Halley step for the root of f(l) = l - i_z - w_x^2 / P - w_y^2 / Q, given 1/P and 1/Q at l.
+// One Halley step for the root of f(l) = l - i_z - w_x^2 / P - w_y^2 / Q, given 1/P and 1/Q at l. `ratio` is about
+// 1 / f', and f' is v.v.
 template <class D, class V = Vec<D>>
-HWY_INLINE V HalleyStep(D d, const Incident<D>& i, V l, V inverse_p, V inverse_q) {
+HWY_INLINE V HalleyStep(D d, const Incident<D>& i, V l, V inverse_p, V inverse_q, V& ratio) {
   const V x = i.wx * i.wx * inverse_p, y = i.wy * i.wy * inverse_q;
   const V x1 = x * inverse_p, y1 = y * inverse_q;
   const V f = l - i.z - (x + y);
   const V f1 = x1 + y1 + Set(d, 1.0f);
   const V f2 = Fma(x1, inverse_p, y1 * inverse_q);  // minus half the second derivative
-  return NegFma(f, f1 / Fma(f1, f1, f * f2), l);
+  ratio = f1 / Fma(f1, f1, f * f2);
+  return NegFma(f, ratio, l);
 }
 
-// 1 / x from a guess y that is wrong by 2 % at most: two Newton steps of third and second order, cheaper than
+// 1 / x to 0.3 %, for a start that is corrected later: a guess from the bits of x, and one Newton step of third
+// order. x in [2^-60, 2^60].
+template <class D, class V = Vec<D>>
+HWY_INLINE V RoughReciprocal(D d, V x) {
+  const Rebind<uint32_t, D> du{};
+  const V y = BitCast(d, Set(du, 0x7EF311C7u) - BitCast(du, x));
+  const V e = NegFma(x, y, Set(d, 1.0f));
+  return Fma(y, Fma(e, e, e), y);
+}
+
+// 1 / x from a guess y that is wrong by 5 % at most: two Newton steps of third and second order, cheaper than
 // a division.
 template <class D, class V = Vec<D>>
 HWY_INLINE V RefineReciprocal(D d, V x, V y) {
@@ -51,63 +64,83 @@ HWY_INLINE V RefineReciprocal(D d, V x, V y) {
   return Fma(y, NegFma(x, y, one), y);
 }
 
-template <class D, class V = Vec<D>>
-HWY_INLINE void MakeCone(D d, const Incident<D>& i, Cone<D>& cone) {
-  const V one = Set(d, 1.0f);
-  const V px = i.z * (i.ax * i.ax);
-  const auto isotropic = i.ax == i.ay;
-  const bool all_isotropic = AllTrue(d, isotropic);
+// Of the lanes of a vector: which are isotropic, and which have an alpha above 1.
+template <class D>
+struct Roughness {
+  Mask<D> isotropic, rough;
+  bool all_isotropic, any_isotropic, any_rough;
+  HWY_INLINE Roughness(D d, const Incident<D>& i)
+      : isotropic(i.ax == i.ay),
+        rough(Max(i.ax, i.ay) > Set(d, 1.0f)),
+        all_isotropic(AllTrue(d, isotropic)),
+        any_isotropic(!AllFalse(d, isotropic)),
+        any_rough(!AllFalse(d, rough)) {}
+};
 
-  // lambda for isotropic roughness; otherwise a start from below, with the mean of i_z alpha^2.
-  V py = px, mean = px;
-  if (!all_isotropic) {
-    py = i.z * (i.ay * i.ay);
-    mean = Select(isotropic, px, Fma(i.wx * i.wx, px, i.wy * i.wy * py) / Max(i.a, Set(d, kSmallestA)));
-  }
+// The positive root of f for isotropic roughness, alpha^2 i_z = mean: (i_z - mean + root) / 2, or its conjugate
+// where i_z < mean, that is for alpha > 1. Otherwise, with the mean of the two, a lower bound.
+template <class D, class V = Vec<D>>
+HWY_INLINE V StartLambda(D d, const Incident<D>& i, const Roughness<D>& roughness, V mean) {
   const V sum = i.z + mean, difference = i.z - mean;
   const V two_a = i.a + i.a;
   const V root = Sqrt(Fma(sum, sum, two_a + two_a));
   V lambda = Set(d, 0.5f) * (difference + root);
-  const auto cancels = difference < Zero(d);
-  if (!AllFalse(d, cancels)) {
+  if (roughness.any_rough) {
     const V numerator = Fma(i.z, mean, i.a);
-    lambda = Select(cancels, (numerator + numerator) / (root - difference), lambda);
+    const V conjugate = (numerator + numerator) / (root - difference);
+    lambda = Select(difference < Zero(d), conjugate, lambda);
   }
+  return lambda;
+}
+
+template <class D, class V = Vec<D>>
+HWY_INLINE void MakeCone(D d, const Incident<D>& i, const Roughness<D>& roughness, Cone<D>& cone) {
+  const V one = Set(d, 1.0f);
+  cone.px = i.z * (i.ax * i.ax);
+  cone.py = cone.px;
+  V mean = cone.px;
+  if (!roughness.all_isotropic) {
+    cone.py = i.z * (i.ay * i.ay);
+    const V weighted = Fma(i.wx * i.wx, cone.px, i.wy * i.wy * cone.py);
+    mean = weighted * RoughReciprocal(d, Max(i.a, Set(d, kSmallestA)));
+    if (roughness.any_isotropic) mean = Select(roughness.isotropic, cone.px, mean);
+  }
+  V lambda = StartLambda(d, i, roughness, mean);
 
   // 1/P and 1/Q by one division; where P = Q this is the same whether or not a neighbour is anisotropic.
-  V p = lambda + px, q = lambda + py;
-  V inverse_pq = one / (p * q);
+  V p = lambda + cone.px, q = lambda + cone.py;
+  const V inverse_pq = one / (p * q);
   cone.inverse_p = q * inverse_pq;
   cone.inverse_q = p * inverse_pq;
   V inverse_root = cone.inverse_p;  // 1 / sqrt(P Q); sqrt(x x) is x in IEEE arithmetic
 
-  if (!all_isotropic) {
-    // The start is wrong by 1.7 % at most for alpha up to 1; then one step leaves 7.5e-7. Larger alpha takes two,
-    // above 4 three. Isotropic lanes need none.
-    const auto step = [&](auto lanes) HWY_ATTR {
-      lambda = Select(lanes, HalleyStep(d, i, lambda, cone.inverse_p, cone.inverse_q), lambda);
-      p = lambda + px;
-      q = lambda + py;
-    };
-    const auto divide = [&](auto lanes) HWY_ATTR {
-      inverse_pq = one / (p * q);
-      cone.inverse_p = Select(lanes, q * inverse_pq, cone.inverse_p);
-      cone.inverse_q = Select(lanes, p * inverse_pq, cone.inverse_q);
-    };
-    step(Not(isotropic));
-    const auto rough = AndNot(isotropic, Max(i.ax, i.ay) > one);
-    const auto smoother = Not(Or(isotropic, rough));
-    cone.inverse_p = Select(smoother, RefineReciprocal(d, p, cone.inverse_p), cone.inverse_p);
-    cone.inverse_q = Select(smoother, RefineReciprocal(d, q, cone.inverse_q), cone.inverse_q);
-    if (!AllFalse(d, rough)) {
-      divide(rough);
-      step(rough);
-      divide(rough);
-      const auto rougher = AndNot(isotropic, Max(i.ax, i.ay) > Set(d, 4.0f));
-      if (!AllFalse(d, rougher)) {
-        step(rougher);
-        divide(rougher);
+  V ratio = one;
+  if (!roughness.all_isotropic) {
+    // The start is wrong by 1.7 % at most for alpha up to 1; then one step leaves 7.5e-7.
+    const V isotropic_lambda = lambda, start_p = cone.inverse_p, start_q = cone.inverse_q;
+    lambda = HalleyStep(d, i, lambda, cone.inverse_p, cone.inverse_q, ratio);
+    p = lambda + cone.px;
+    q = lambda + cone.py;
+    cone.inverse_p = RefineReciprocal(d, p, cone.inverse_p);
+    cone.inverse_q = RefineReciprocal(d, q, cone.inverse_q);
+    if (roughness.any_rough) {
+      // Larger alpha takes two steps, above 4 three.
+      const auto rougher = Max(i.ax, i.ay) > Set(d, 4.0f);
+      for (const auto& lanes : {roughness.rough, rougher}) {
+        const V inverse = one / (p * q);
+        V unused;
+        lambda = Select(lanes, HalleyStep(d, i, lambda, q * inverse, p * inverse, unused), lambda);
+        p = lambda + cone.px;
+        q = lambda + cone.py;
       }
+      const V inverse = one / (p * q);
+      cone.inverse_p = Select(roughness.rough, q * inverse, cone.inverse_p);
+      cone.inverse_q = Select(roughness.rough, p * inverse, cone.inverse_q);
+    }
+    if (roughness.any_isotropic) {
+      lambda = Select(roughness.isotropic, isotropic_lambda, lambda);
+      cone.inverse_p = Select(roughness.isotropic, start_p, cone.inverse_p);
+      cone.inverse_q = Select(roughness.isotropic, start_q, cone.inverse_q);
     }
     inverse_root = Sqrt(cone.inverse_p * cone.inverse_q);
   }
@@ -115,7 +148,14 @@ HWY_INLINE void MakeCone(D d, const Incident<D>& i, Cone<D>& cone) {
   cone.lambda = lambda;
   cone.vx = i.wx * cone.inverse_p;
   cone.vy = i.wy * cone.inverse_q;
-  cone.inverse_n2 = one / Fma(cone.vx, cone.vx, Fma(cone.vy, cone.vy, one));
+  const V n2 = Fma(cone.vx, cone.vx, Fma(cone.vy, cone.vy, one));
+  if (roughness.all_isotropic) {
+    cone.inverse_n2 = one / n2;
+  } else {
+    cone.inverse_n2 = RefineReciprocal(d, n2, ratio);
+    if (roughness.any_isotropic || roughness.any_rough)
+      cone.inverse_n2 = Select(Or(roughness.isotropic, roughness.rough), one / n2, cone.inverse_n2);
+  }
   cone.two_k = (lambda + lambda) * lambda * (cone.inverse_n2 * inverse_root);
 }
 
@@ -129,15 +169,16 @@ struct Exact {
   template <class D, class V = Vec<D>>
   static HWY_INLINE V TwoN(D d, const Incident<D>& i, V, V) {
     Cone<D> cone;
-    MakeCone(d, i, cone);
+    MakeCone(d, i, Roughness<D>(d, i), cone);
     return Select(i.front, cone.two_k, i.t);
   }
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V u3, Drawn<D>& drawn) {
+    const Roughness<D> roughness(d, i);
     Cone<D> cone;
-    MakeCone(d, i, cone);
-    const V one = Set(d, 1.0f), rim = Set(d, kRim);
+    MakeCone(d, i, roughness, cone);
+    const V rim = Set(d, kRim);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
 
@@ -145,27 +186,27 @@ struct Exact {
     const V lambda_u = cone.lambda * u1;
     const V rp = Sqrt(lambda_u * cone.inverse_p);
     V rq = rp;
-    if (!AllTrue(d, i.ax == i.ay)) rq = Sqrt(lambda_u * cone.inverse_q);
+    if (!roughness.all_isotropic) rq = Sqrt(lambda_u * cone.inverse_q);
     const V xi = rp * cos, eta = rq * sin;
     const V along = Fma(xi, cone.vx, eta * cone.vy);
     const V y = Neg(along * cone.inverse_n2);
-    // zeta^2 v.v = 1 - xi^2 - eta^2 + along^2 / v.v. At the rim 1 - xi^2 - eta^2 cancels; by 1 - lambda / P =
-    // i_z ax^2 / P it is a sum of positive terms: (1 - u1) lambda X + i_z (ax^2 cos^2 / P + ay^2 sin^2 / Q),
-    // X = cos^2 / P + sin^2 / Q.
+    // zeta^2 v.v = 1 - xi^2 - eta^2 + along^2 / v.v. At the rim 1 - xi^2 - eta^2 cancels; by 1 = (lambda + px) / P it
+    // is a sum of positive terms.
+    const V left = NegFma(cone.lambda, u1, cone.lambda);  // lambda (1 - u1)
     const V cp = cos * cos * cone.inverse_p, sq = sin * sin * cone.inverse_q;
-    const V inside = Fma((one - u1) * cone.lambda, cp + sq, i.z * Fma(i.ax * i.ax, cp, i.ay * i.ay * sq));
+    const V inside = Fma(cp, left + cone.px, sq * (left + cone.py));
     const V zeta = Sqrt(Fma(y, y, inside * cone.inverse_n2));
 
     // The sample or its mirror image about the axis, in proportion to w.m_hat.
     const V across = Fma(xi, i.wx, eta * i.wy);
     const V g_zeta = cone.lambda * zeta;
     const V threshold = Fma(cone.lambda, y, across) + g_zeta;
-    const auto mirrored = Not(u3 * (g_zeta + g_zeta) < threshold);
+    const auto mirrored = u3 * (g_zeta + g_zeta) >= threshold;
     const V sign = IfThenElseZero(mirrored, SignBit(d));
     const V hz = Max(zeta + Xor(y, sign), rim);
     const V hx = Fma(hz, cone.vx, Xor(xi, sign)), hy = Fma(hz, cone.vy, Xor(eta, sign));
     Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), rim * cone.lambda);
+    drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
     drawn.two_n = cone.two_k;
 
     // Behind, nothing is occluded: the cap.

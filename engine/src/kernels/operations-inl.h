@@ -339,7 +339,7 @@ struct MaskingOf {
     StoreU(exceptions.Output(i.t * Set(d, 0.5f), mirror * in.z), d, tile.out[kOutArea] + lane);
     if (tile.wanted & kWantsShare) {
       Cone<D> cone;
-      MakeCone(d, i, cone);
+      MakeCone(d, i, Roughness<D>(d, i), cone);
       const V share = Select(i.front, Min(cone.two_k / i.t, one), one);
       StoreU(exceptions.Output(share, one), d, tile.out[kOutShare] + lane);
     }
