@@ -1,0 +1,207 @@
+#include "support/lobe.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace facetwise::test {
+namespace {
+
+using reference::Vector;
+
+constexpr double kHalfPi = std::numbers::pi / 2, kTwoPi = 2 * std::numbers::pi;
+
+// Gauss-Legendre nodes and weights on [-1, 1], by Newton's method on the Legendre polynomial.
+template <int N>
+struct Gauss {
+  std::array<double, N> x, w;
+  Gauss() {
+    for (int k = 0; k < N; ++k) {
+      double z = std::cos(std::numbers::pi * (k + 0.75) / (N + 0.5)), derivative = 1;
+      for (int step = 0; step < 50; ++step) {
+        double p = 1, before = 0;
+        for (int n = 1; n <= N; ++n) {
+          const double next = ((2 * n - 1) * z * p - (n - 1) * before) / n;
+          before = p;
+          p = next;
+        }
+        derivative = N * (z * p - before) / (z * z - 1);
+        z -= p / derivative;
+      }
+      x[k] = z;
+      w[k] = 2 / ((1 - z * z) * derivative * derivative);
+    }
+  }
+};
+
+const Gauss<6>& inner_rule() {
+  static const Gauss<6> rule;
+  return rule;
+}
+const Gauss<8>& outer_rule() {
+  static const Gauss<8> rule;
+  return rule;
+}
+
+// The part of the meridian phi that belongs to the lobe is one interval [low, high] of t. In x = tan t, with
+// w = alpha_x i_x cos phi + alpha_y i_y sin phi and a = (alpha_x cos phi)^2 + (alpha_y sin phi)^2,
+//   i.m > 0  where  i_z + w x > 0;
+//   o_z > 0  where  i_z + 2 w x - i_z a x^2 > 0   (from 2 (i.m) m_z > i_z |m|^2).
+// For i_z > 0 the second implies the first, for i_z <= 0 the first the second.
+struct Interval {
+  double low = 0, high = 0;
+};
+
+Interval meridian(const Lobe& lobe, double phi) {
+  const double cos = std::cos(phi), sin = std::sin(phi), iz = lobe.i.z;
+  const double ax = lobe.alpha.x * cos, ay = lobe.alpha.y * sin;
+  const double w = lobe.i.x * ax + lobe.i.y * ay, a = ax * ax + ay * ay;
+  if (iz <= 0) {
+    if (w <= 0) return {};
+    return {std::atan2(-iz, w), kHalfPi};
+  }
+  if (lobe.reflections) {
+    const double root = std::sqrt(w * w + iz * iz * a);
+    return {0, w > 0 ? std::atan2(w + root, iz * a) : std::atan2(iz, root - w)};
+  }
+  return {0, w >= 0 ? kHalfPi : std::atan2(iz, -w)};
+}
+
+// The integrand per dt dphi.
+double value_at(const Lobe& lobe, const Integrand& integrand, double t, double phi) {
+  const double sin = std::sin(t);
+  const Vector big = {lobe.alpha.x * sin * std::cos(phi), lobe.alpha.y * sin * std::sin(phi), std::cos(t)};
+  const double length = std::sqrt(big.x * big.x + big.y * big.y + big.z * big.z);
+  const Vector m = {big.x / length, big.y / length, big.z / length};
+  const double im = lobe.i.x * m.x + lobe.i.y * m.y + lobe.i.z * m.z;
+  double jacobian = lobe.alpha.x * lobe.alpha.y / (length * length * length) * sin;
+  if (lobe.reflections && !lobe.per_normal) jacobian *= 4 * im;
+  if (jacobian <= 0) return 0;
+  return jacobian * integrand(m, reflect(lobe.i, m));
+}
+
+// Integrals over phi in [a, b] of all t cells, by the outer rule.
+void strip(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b,
+           std::vector<double>& sums) {
+  std::fill(sums.begin(), sums.end(), 0.0);
+  const auto& outer = outer_rule();
+  const auto& inner = inner_rule();
+  for (std::size_t k = 0; k < outer.x.size(); ++k) {
+    const double phi = (a + b) / 2 + (b - a) / 2 * outer.x[k];
+    const Interval part = meridian(lobe, phi);
+    for (std::size_t cell = 0; cell + 1 < grid.t.size(); ++cell) {
+      const double low = std::max(grid.t[cell], part.low), high = std::min(grid.t[cell + 1], part.high);
+      if (!(low < high)) continue;
+      double sum = 0;
+      for (std::size_t n = 0; n < inner.x.size(); ++n)
+        sum += inner.w[n] * value_at(lobe, integrand, (low + high) / 2 + (high - low) / 2 * inner.x[n], phi);
+      sums[cell] += sum * (high - low) / 2 * outer.w[k] * (b - a) / 2;
+    }
+  }
+}
+
+void refine(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b,
+            const std::vector<double>& whole, double tolerance, int depth, double* out) {
+  const std::size_t cells = whole.size();
+  std::vector<double> left(cells), right(cells);
+  const double middle = (a + b) / 2;
+  strip(lobe, grid, integrand, a, middle, left);
+  strip(lobe, grid, integrand, middle, b, right);
+  double error = 0;
+  for (std::size_t n = 0; n < cells; ++n) error = std::max(error, std::abs(whole[n] - left[n] - right[n]));
+  if (error <= tolerance || depth == 0) {
+    for (std::size_t n = 0; n < cells; ++n) out[n] += left[n] + right[n];
+    return;
+  }
+  refine(lobe, grid, integrand, a, middle, left, tolerance, depth - 1, out);
+  refine(lobe, grid, integrand, middle, b, right, tolerance, depth - 1, out);
+}
+
+// Edges that cut a histogram over [low, high] into equal parts.
+std::vector<double> quantiles(const std::vector<double>& histogram, double low, double high, int cells, double first,
+                              double last) {
+  double total = 0;
+  for (double h : histogram) total += h;
+  std::vector<double> edges = {first};
+  double sum = 0;
+  const double width = (high - low) / histogram.size();
+  for (std::size_t n = 0; n < histogram.size(); ++n) {
+    while (static_cast<int>(edges.size()) < cells && histogram[n] > 0 &&
+           sum + histogram[n] >= total * edges.size() / cells) {
+      const double inside = (total * edges.size() / cells - sum) / histogram[n];
+      edges.push_back(low + width * (n + std::clamp(inside, 0.0, 1.0)));
+    }
+    sum += histogram[n];
+  }
+  edges.push_back(last);
+  return edges;
+}
+
+}  // namespace
+
+std::size_t Grid::cell(reference::Roughness alpha, Vector m) const {
+  const double x = m.x / alpha.x, y = m.y / alpha.y;
+  const double polar = std::atan2(std::sqrt(x * x + y * y), m.z);
+  double azimuth = std::atan2(y, x);
+  if (azimuth < 0) azimuth += kTwoPi;
+  const auto find = [](const std::vector<double>& edges, double value) {
+    const auto after = std::upper_bound(edges.begin() + 1, edges.end() - 1, value);
+    return static_cast<std::size_t>(after - edges.begin() - 1);
+  };
+  return index(find(phi, azimuth), find(t, polar));
+}
+
+Grid make_grid(const Lobe& lobe, const Integrand& integrand, int t_cells, int phi_cells) {
+  constexpr int kSteps = 256;
+  double low = kHalfPi, high = 0;
+  for (int n = 0; n < kSteps; ++n) {
+    const Interval part = meridian(lobe, kTwoPi * (n + 0.5) / kSteps);
+    if (!(part.low < part.high)) continue;
+    low = std::min(low, part.low);
+    high = std::max(high, part.high);
+  }
+  std::vector<double> of_t(kSteps), of_phi(kSteps);
+  for (int p = 0; p < kSteps; ++p) {
+    const double phi = kTwoPi * (p + 0.5) / kSteps;
+    const Interval part = meridian(lobe, phi);
+    for (int n = 0; n < kSteps; ++n) {
+      const double t = low + (high - low) * (n + 0.5) / kSteps;
+      if (t <= part.low || t >= part.high) continue;
+      const double value = value_at(lobe, integrand, t, phi);
+      of_t[n] += value;
+      of_phi[p] += value;
+    }
+  }
+  return {quantiles(of_t, low, high, t_cells, 0, kHalfPi), quantiles(of_phi, 0, kTwoPi, phi_cells, 0, kTwoPi)};
+}
+
+std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double tolerance) {
+  std::vector<double> cells(grid.cells());
+  std::vector<double> whole(grid.t.size() - 1);
+  for (std::size_t p = 0; p + 1 < grid.phi.size(); ++p) {
+    strip(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole);
+    refine(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole, tolerance, 20, &cells[grid.index(p, 0)]);
+  }
+  return cells;
+}
+
+double integrate(const Lobe& lobe, const Integrand& integrand, double tolerance) {
+  double sum = 0;
+  for (double cell : integrate_cells(lobe, make_grid(lobe, integrand, 12, 12), integrand, tolerance)) sum += cell;
+  return sum;
+}
+
+Vector normal_at(const Lobe& lobe, double t, double phi) {
+  const Vector big = {lobe.alpha.x * std::sin(t) * std::cos(phi), lobe.alpha.y * std::sin(t) * std::sin(phi),
+                      std::cos(t)};
+  const double length = std::sqrt(big.x * big.x + big.y * big.y + big.z * big.z);
+  return {big.x / length, big.y / length, big.z / length};
+}
+
+Vector reflect(Vector i, Vector m) {
+  const double twice = 2 * (i.x * m.x + i.y * m.y + i.z * m.z);
+  return {twice * m.x - i.x, twice * m.y - i.y, twice * m.z - i.z};
+}
+
+}  // namespace facetwise::test
