@@ -52,7 +52,9 @@ TEST_P(ChiSquareTest, SamplesFollowTheDensity) {
   const double level = sidak(kAnyFailure, static_cast<int>(configurations().size()));
   EXPECT_GE(test.p_value, level) << "chi-square " << test.statistic << " at " << test.degrees << " degrees";
   EXPECT_LE(verdict.outside, 1e-6) << "an accepted sample where the density is 0";
-  EXPECT_LE(verdict.reflection_error, 12 * 0x1p-24) << "o is not the reflection of i by m";
+  // A few in a million may have a half vector so short (o nearly -i) that m, or i.m, is known to fewer
+  // digits.
+  EXPECT_LE(verdict.unreflected, draw.count / 50'000) << "o is not the reflection of i by m";
   EXPECT_EQ(verdict.statistics.smooth + verdict.statistics.invalid, 0u);
   EXPECT_EQ(verdict.statistics.lanes(), draw.count);
   if (c.operation == Operation::sample_reflection && (c.sampler == Sampler::exact || draw.i.z <= 0) &&
@@ -61,8 +63,8 @@ TEST_P(ChiSquareTest, SamplesFollowTheDensity) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Reflections, ChiSquareTest, testing::ValuesIn(cases(Operation::sample_reflection, 1)),
-                         case_name);
+INSTANTIATE_TEST_SUITE_P(Reflections, ChiSquareTest,
+                         testing::ValuesIn(cases(Operation::sample_reflection, 1)), case_name);
 INSTANTIATE_TEST_SUITE_P(Normals, ChiSquareTest,
                          testing::ValuesIn(cases(Operation::sample_normal, kQuick ? 2 : 3)), case_name);
 
@@ -71,7 +73,8 @@ TEST(ChiSquare, CoversAtLeastSixtyConfigurations) { EXPECT_GE(configurations().s
 #endif
 
 TEST(ChiSquare, PValuesAreRight) {
-  // The survival function of chi-square at its 5 % points, exp(-x) for two degrees, and exp(-500) sum 500^k / k!.
+  // The survival function of chi-square at its 5 % points, exp(-x) for two degrees, and exp(-500) sum 500^k /
+  // k!.
   EXPECT_NEAR(upper_incomplete_gamma(0.5, 3.841458820694124 / 2), 0.05, 1e-12);
   EXPECT_NEAR(upper_incomplete_gamma(5, 18.307038053275146 / 2), 0.05, 1e-12);
   EXPECT_NEAR(upper_incomplete_gamma(1, 30), std::exp(-30), 1e-24);

@@ -40,7 +40,8 @@ double upper_incomplete_gamma(double a, double x) {
   return h * factor(a, x);
 }
 
-ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> expected, double smallest) {
+ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> expected,
+                     double smallest) {
   std::vector<std::size_t> order(counts.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return expected[a] < expected[b]; });
@@ -67,8 +68,10 @@ ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const doub
     result.statistic = std::numeric_limits<double>::infinity();  // samples where none can be
   }
   result.degrees = std::max(0, cells - 1);
-  if (std::isinf(result.statistic)) result.p_value = 0;
-  else if (result.degrees > 0) result.p_value = upper_incomplete_gamma(result.degrees / 2.0, result.statistic / 2);
+  if (std::isinf(result.statistic))
+    result.p_value = 0;
+  else if (result.degrees > 0)
+    result.p_value = upper_incomplete_gamma(result.degrees / 2.0, result.statistic / 2);
   return result;
 }
 

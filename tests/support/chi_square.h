@@ -15,8 +15,8 @@ struct ChiSquare {
   double p_value = 1;  // 1 where no degree of freedom is left
 };
 
-// Cells that expect less than `smallest` are pooled. Both spans have one value per cell, every sample is in one
-// of the cells, and sum(expected) = sum(counts) but for rounding.
+// Cells that expect less than `smallest` are pooled. Both spans have one value per cell, every sample is in
+// one of the cells, and sum(expected) = sum(counts) but for rounding.
 ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> expected,
                      double smallest = 10);
 

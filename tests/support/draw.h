@@ -25,7 +25,8 @@ struct Draw {
   std::uint64_t count = 0;
 };
 
-// Calls `each` for every sample, in order, and returns the call's statistics. Throws on an error of the engine.
+// Calls `each` for every sample, in order, and returns the call's statistics. Throws on an error of the
+// engine.
 Statistics draw(const Draw& draw, const std::function<void(const Drawn&)>& each);
 
 }  // namespace facetwise::test

@@ -64,8 +64,9 @@ Verdict test_hypotheses(const Draw& what, const std::vector<Hypothesis>& hypothe
   std::vector<Cells> all;
   for (const Hypothesis& hypothesis : hypotheses) all.push_back(make_cells(hypothesis, what.count));
 
-  // A sample's normal is the half vector of i and o. Where o's rounding to float alone would move that by more
-  // than 3e-4 of the lobe, it is the normal that the kernel returns with o; that o is its reflection is checked.
+  // A sample's normal is the half vector of i and o. Where o's rounding to float alone would move that by
+  // more than 3e-4 of the lobe, it is the normal that the kernel returns with o; that o is its reflection is
+  // checked.
   const double alpha = std::min(what.alpha.x, what.alpha.y);
   const bool from_o = reflections && 0x1p-24 / (alpha * std::max(std::abs(what.i.z), alpha)) < 3e-4;
 
@@ -79,13 +80,13 @@ Verdict test_hypotheses(const Draw& what, const std::vector<Hypothesis>& hypothe
     if (!reflections) verdict.outside = std::max({verdict.outside, -dot(what.i, m), -m.z});
     if (reflections) {
       const Vector o = reflect(what.i, m);
-      const double error =
-          std::hypot(sample.o.x - o.x, sample.o.y - o.y, sample.o.z - o.z);
-      verdict.reflection_error = std::max(verdict.reflection_error, error);
+      const double error = std::hypot(sample.o.x - o.x, sample.o.y - o.y, sample.o.z - o.z);
+      if (error > 0x1p-20) ++verdict.unreflected;
       verdict.outside = std::max({verdict.outside, -sample.o.z, -sample.o.z - what.i.z});
       if (from_o) m = unit({what.i.x + sample.o.x, what.i.y + sample.o.y, what.i.z + sample.o.z});
     }
-    for (std::size_t n = 0; n < all.size(); ++n) ++all[n].counts[all[n].grid.cell(hypotheses[n].lobe.alpha, m)];
+    for (std::size_t n = 0; n < all.size(); ++n)
+      ++all[n].counts[all[n].grid.cell(hypotheses[n].lobe.alpha, m)];
   });
   for (const Cells& cells : all) verdict.tests.push_back(chi_square(cells.counts, cells.expected));
   verdict.share_expected = 1 - all[0].expected.back() / static_cast<double>(what.count);

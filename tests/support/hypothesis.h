@@ -28,13 +28,13 @@ struct Verdict {
   // How far accepted samples lie outside of the region of positive density, at most. That region has
   // o_z > 0 and i_z + o_z > 0; of normals, i.m > 0 and m_z > 0.
   double outside = 0;
-  // |o - reflect(i, m)|, at most.
-  double reflection_error = 0;
+  // Accepted samples with |o - reflect(i, m)| > 2^-20.
+  std::uint64_t unreflected = 0;
   double share_expected = 0;  // accepted, by the first hypothesis
 };
 
-// Draws once and tests every hypothesis. Expected counts are integrals of the density over each cell; occluded
-// samples are one more cell.
+// Draws once and tests every hypothesis. Expected counts are integrals of the density over each cell;
+// occluded samples are one more cell.
 Verdict test_hypotheses(const Draw& draw, const std::vector<Hypothesis>& hypotheses);
 
 }  // namespace facetwise::test

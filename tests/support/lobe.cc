@@ -119,8 +119,8 @@ void refine(const Lobe& lobe, const Grid& grid, const Integrand& integrand, doub
 }
 
 // Edges that cut a histogram over [low, high] into equal parts.
-std::vector<double> quantiles(const std::vector<double>& histogram, double low, double high, int cells, double first,
-                              double last) {
+std::vector<double> quantiles(const std::vector<double>& histogram, double low, double high, int cells,
+                              double first, double last) {
   double total = 0;
   for (double h : histogram) total += h;
   std::vector<double> edges = {first};
@@ -173,22 +173,26 @@ Grid make_grid(const Lobe& lobe, const Integrand& integrand, int t_cells, int ph
       of_phi[p] += value;
     }
   }
-  return {quantiles(of_t, low, high, t_cells, 0, kHalfPi), quantiles(of_phi, 0, kTwoPi, phi_cells, 0, kTwoPi)};
+  return {quantiles(of_t, low, high, t_cells, 0, kHalfPi),
+          quantiles(of_phi, 0, kTwoPi, phi_cells, 0, kTwoPi)};
 }
 
-std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double tolerance) {
+std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
+                                    double tolerance) {
   std::vector<double> cells(grid.cells());
   std::vector<double> whole(grid.t.size() - 1);
   for (std::size_t p = 0; p + 1 < grid.phi.size(); ++p) {
     strip(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole);
-    refine(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole, tolerance, 20, &cells[grid.index(p, 0)]);
+    refine(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole, tolerance, 20,
+           &cells[grid.index(p, 0)]);
   }
   return cells;
 }
 
 double integrate(const Lobe& lobe, const Integrand& integrand, double tolerance) {
   double sum = 0;
-  for (double cell : integrate_cells(lobe, make_grid(lobe, integrand, 12, 12), integrand, tolerance)) sum += cell;
+  for (double cell : integrate_cells(lobe, make_grid(lobe, integrand, 12, 12), integrand, tolerance))
+    sum += cell;
   return sum;
 }
 

@@ -81,7 +81,8 @@ inline Cone cone(Vector i, const Stretched& s, float ax, float ay) {
 }
 
 // N in p(o) = D(m) / (4 N).
-inline float normaliser(Sampler sampler, Vector i, const Stretched& s, float im, float mz, float ax, float ay) {
+inline float normaliser(Sampler sampler, Vector i, const Stretched& s, float im, float mz, float ax,
+                        float ay) {
   if (sampler == Sampler::ndf) return im / mz;
   if (sampler == Sampler::bounded && i.z > 0) return (bound(i, ax, ay) * i.z + s.nu) / 2;
   if (sampler == Sampler::exact && i.z > 0) return cone(i, s, ax, ay).k;
@@ -89,7 +90,8 @@ inline float normaliser(Sampler sampler, Vector i, const Stretched& s, float im,
 }
 
 // f cos(theta_o) / pdf of visible normals' reflections, for o_z > 0.
-inline float shadowing_weight(Shadowing shadowing, Vector i, const Stretched& s, Vector o, float ax, float ay) {
+inline float shadowing_weight(Shadowing shadowing, Vector i, const Stretched& s, Vector o, float ax,
+                              float ay) {
   const float x = ax * o.x, y = ay * o.y;
   const float a = x * x + y * y;
   const float t = o.z + std::sqrt(a + o.z * o.z);
@@ -221,8 +223,8 @@ inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float 
   const Vector h = i + o;
   if (o.z <= 0 || h.z <= 0 || dot(i, h) <= 0) return 0;
   const Stretched s = stretch(i, alpha_x, alpha_y);
-  return shadowing_weight(shadowing, i, s, o, alpha_x, alpha_y) * distribution(normalize(h), alpha_x, alpha_y) /
-         (4 * s.area);
+  return shadowing_weight(shadowing, i, s, o, alpha_x, alpha_y) *
+         distribution(normalize(h), alpha_x, alpha_y) / (4 * s.area);
 }
 
 inline float masking(Vector i, float alpha_x, float alpha_y) {

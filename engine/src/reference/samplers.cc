@@ -23,8 +23,7 @@ double bound(Roughness alpha, Vector i) {
 double normaliser(Sampler sampler, Roughness alpha, Vector i, Vector m) {
   if (sampler == Sampler::ndf) return dot(i, m) / m.z;
   if (i.z > 0 && sampler == Sampler::exact) return unoccluded_cone(alpha, i).k;
-  if (i.z > 0 && sampler == Sampler::bounded)
-    return (bound(alpha, i) * i.z + length(stretch(alpha, i))) / 2;
+  if (i.z > 0 && sampler == Sampler::bounded) return (bound(alpha, i) * i.z + length(stretch(alpha, i))) / 2;
   return projected_area(alpha, i);
 }
 
@@ -33,8 +32,8 @@ Vector sample_ndf(double u1, double u2) {
   return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u1)};
 }
 
-// Heitz 2018 on the stretched i_hat: a point of the unit disk, whose half towards n is compressed by s, raised
-// to the hemisphere about i_hat. The written forms lose digits behind the surface (s -> 0), so
+// Heitz 2018 on the stretched i_hat: a point of the unit disk, whose half towards n is compressed by s,
+// raised to the hemisphere about i_hat. The written forms lose digits behind the surface (s -> 0), so
 //   R - t2 = s (R - r sin phi),  t_w^2 = R^2 - t2^2 = (R - t2) (R + t2),
 // and m_hat_z = t2 sin(i_hat) + t_w c is taken by its conjugate where c < 0.
 Vector sample_heitz(Roughness alpha, Vector i, double u1, double u2) {
@@ -47,7 +46,7 @@ Vector sample_heitz(Roughness alpha, Vector i, double u1, double u2) {
 
   const double phi = 2 * std::numbers::pi * u2, r = std::sqrt(u1);
   const double t1 = r * std::cos(phi), radial = r * std::sin(phi);
-  const double disk = std::hypot(radial, std::sqrt(1 - u1));  // R = sqrt(1 - t1^2)
+  const double disk = std::hypot(radial, std::sqrt(1 - u1));                     // R = sqrt(1 - t1^2)
   const double minus = radial > 0 ? (1 - u1) / (disk + radial) : disk - radial;  // R - r sin phi
   const double plus = radial > 0 ? disk + radial : (1 - u1) / (disk - radial);   // R + r sin phi
   const double t2 = disk - s * minus;
@@ -127,8 +126,8 @@ Sample sample_reflection(const Model& model, Sampler sampler, Roughness alpha, V
     sample.status = LaneStatus::occluded;
     return sample;
   }
-  // From m itself: the half vector of o would lose digits. f cos(theta_o) = w D / (4 sigma), so that D cancels
-  // in the weight.
+  // From m itself: the half vector of o would lose digits. f cos(theta_o) = w D / (4 sigma), so that D
+  // cancels in the weight.
   const double n = normaliser(sampler, alpha, i, sample.m);
   sample.pdf = distribution(alpha, sample.m) / (4 * n);
   sample.weight = shadowing_weight(model.shadowing, alpha, i, sample.o) * n / projected_area(alpha, i);
