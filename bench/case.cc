@@ -1,0 +1,215 @@
+#include "case.h"
+
+#include <re2/re2.h>
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace facetwise::bench {
+namespace {
+
+constexpr std::size_t kBatches[] = {256, 4096, 65536, std::size_t{1} << 20, std::size_t{1} << 24};
+constexpr std::size_t kBatch = 65536;
+constexpr std::pair<float, float> kAlphas[] = {{0.3f, 0.3f}, {0.8f, 0.1f}, {0.01f, 0.01f}, {1.0f, 1.0f}};
+constexpr Implementation kImplementations[] = {Implementation::scalar, Implementation::one_lane,
+                                               Implementation::simd, Implementation::simd_threads,
+                                               Implementation::remote};
+constexpr Sampler kReflectionSamplers[] = {Sampler::bounded, Sampler::exact};
+
+class List {
+ public:
+  // Every implementation that can run `which`.
+  void add(Case which) {
+    for (const Implementation implementation : kImplementations) {
+      which.implementation = implementation;
+      // The baseline takes its random numbers from columns alone.
+      if (implementation == Implementation::scalar && which.inputs == Inputs::generator) continue;
+      cases_.push_back(which);
+    }
+  }
+  std::vector<Case> take() { return std::move(cases_); }
+
+ private:
+  std::vector<Case> cases_;
+};
+
+// Operations with the samplers they take.
+std::vector<Case> operations(std::span<const Sampler> query_samplers, std::span<const Sampler> normal_samplers) {
+  std::vector<Case> cases;
+  for (const Sampler sampler : normal_samplers)
+    cases.push_back({.operation = Operation::sample_normal, .sampler = sampler});
+  for (const Sampler sampler : query_samplers)
+    cases.push_back({.operation = Operation::pdf_reflection, .sampler = sampler});
+  cases.push_back({.operation = Operation::evaluate_reflection, .sampler = std::nullopt});
+  for (const Sampler sampler : query_samplers)
+    cases.push_back({.operation = Operation::evaluate_and_pdf, .sampler = sampler});
+  cases.push_back({.operation = Operation::masking, .sampler = std::nullopt});
+  return cases;
+}
+
+std::vector<Case> quick_cases() {
+  List list;
+  for (const Sampler sampler : all_samplers()) list.add({.sampler = sampler});
+  for (const Sampler sampler : kReflectionSamplers) list.add({.sampler = sampler, .alpha_x = 0.8f, .alpha_y = 0.1f});
+  return list.take();
+}
+
+std::vector<Case> standard_cases() {
+  List list;
+  for (int k = 0; k < 2; ++k)
+    for (const Sampler sampler : all_samplers())
+      list.add({.sampler = sampler, .alpha_x = kAlphas[k].first, .alpha_y = kAlphas[k].second});
+  for (const Sampler sampler : kReflectionSamplers)
+    for (const Inputs inputs : {Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
+      list.add({.sampler = sampler, .inputs = inputs});
+  constexpr Sampler kNormals[] = {Sampler::cap};
+  for (const Case& which : operations(kReflectionSamplers, kNormals)) list.add(which);
+  for (const std::size_t batch : kBatches)
+    for (const Sampler sampler : kReflectionSamplers)
+      if (batch != kBatch) list.add({.sampler = sampler, .batch = batch});
+  return list.take();
+}
+
+std::vector<Case> all_cases() {
+  List list;
+  constexpr Sampler kNormals[] = {Sampler::ndf, Sampler::heitz, Sampler::cap};
+  for (const std::size_t batch : kBatches) {
+    for (const auto& [alpha_x, alpha_y] : kAlphas) {
+      for (const Inputs inputs : {Inputs::columns, Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
+        for (const Sampler sampler : all_samplers())
+          list.add({.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
+      for (Case which : operations(all_samplers(), kNormals)) {
+        which.alpha_x = alpha_x;
+        which.alpha_y = alpha_y;
+        which.batch = batch;
+        list.add(which);
+      }
+    }
+  }
+  return list.take();
+}
+
+}  // namespace
+
+std::string_view name(Implementation implementation) {
+  switch (implementation) {
+    case Implementation::scalar: return "scalar";
+    case Implementation::one_lane: return "one-lane";
+    case Implementation::simd: return "simd";
+    case Implementation::simd_threads: return "simd-threads";
+    case Implementation::remote: return "remote";
+  }
+  return "";
+}
+
+std::string_view name(Inputs inputs) {
+  switch (inputs) {
+    case Inputs::columns: return "columns";
+    case Inputs::one_roughness: return "one-roughness";
+    case Inputs::generator: return "generator";
+    case Inputs::backfacing: return "backfacing";
+  }
+  return "";
+}
+
+int Case::input_columns() const {
+  int columns = 3;  // incident
+  if (inputs != Inputs::one_roughness) columns += 2;
+  if (is_sampling()) {
+    if (inputs != Inputs::generator) columns += uses_u3() ? 3 : 2;
+  } else if (operation != Operation::masking) {
+    columns += 3;  // outgoing
+  }
+  return columns;
+}
+
+int Case::output_columns() const {
+  if (is_sampling()) return 4;  // a direction and its pdf
+  return operation == Operation::evaluate_and_pdf ? 2 : 1;
+}
+
+bool Case::comparable(const Case& other) const {
+  return operation == other.operation && sampler == other.sampler && alpha_x == other.alpha_x &&
+         alpha_y == other.alpha_y && batch == other.batch && inputs == other.inputs;
+}
+
+BenchResult describe(const Case& which) {
+  BenchResult result;
+  result.operation = which.operation;
+  result.sampler = which.sampler ? std::string(facetwise::name(*which.sampler)) : "none";
+  // As the decimal that was written, not as the nearest float.
+  const auto decimal = [](float value) {
+    double parsed = 0;
+    (void)absl::SimpleAtod(absl::StrCat(value), &parsed);
+    return parsed;
+  };
+  result.alpha_x = decimal(which.alpha_x);
+  result.alpha_y = decimal(which.alpha_y);
+  result.implementation = std::string(name(which.implementation));
+  result.inputs = std::string(name(which.inputs));
+  result.batch = result.samples = which.batch;
+  result.bytes_per_sample = 4.0 * (which.input_columns() + which.output_columns());
+  return result;
+}
+
+absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options) {
+  RE2::Options quiet;
+  quiet.set_log_errors(false);
+  const RE2 filter(options.filter, quiet);
+  if (!filter.ok())
+    return absl::InvalidArgumentError(
+        absl::StrCat("filter: \"", options.filter, "\" is no regular expression: ", filter.error()));
+  std::vector<Case> cases;
+  if (options.suite == BenchSuite::quick)
+    cases = quick_cases();
+  else if (options.suite == BenchSuite::full || !options.filter.empty())
+    cases = all_cases();
+  else
+    cases = standard_cases();
+  if (options.remote == nullptr)
+    std::erase_if(cases, [](const Case& which) { return which.implementation == Implementation::remote; });
+  std::erase_if(cases, [&](const Case& which) { return !RE2::PartialMatch(describe(which).name(), filter); });
+  if (cases.empty())
+    return absl::InvalidArgumentError(
+        absl::StrCat("filter: \"", options.filter, "\" matches none of the benchmarks, whose names are like ",
+                     "\"sample_reflection/bounded/0.3,0.3/65536/simd\"",
+                     options.remote == nullptr ? " (and /remote only where a server is given)" : ""));
+  return cases;
+}
+
+int flops(const Case& which) {
+  const bool isotropic = which.alpha_x == which.alpha_y;
+  constexpr int kLength = 6, kPrepare = 9, kSinCos = 19, kReflect = 8, kBound = 20, kShadowing = 17;
+  const int cone = isotropic ? 28 : 80;
+  if (which.operation == Operation::masking) return kLength + kPrepare + 2;
+  if (which.is_sampling()) {
+    int draw = 0;
+    switch (*which.sampler) {
+      case Sampler::ndf: draw = 26; break;
+      case Sampler::heitz: draw = 56; break;
+      case Sampler::cap: draw = 31; break;
+      case Sampler::bounded: draw = 31 + kBound; break;
+      case Sampler::exact: draw = cone + (isotropic ? 60 : 62); break;
+    }
+    const int normal = which.operation == Operation::sample_normal ? 8 : 0;
+    return kLength + kPrepare + kSinCos + draw + kReflect + normal;
+  }
+  constexpr int kDensity = kPrepare + 2 * kLength + 29;
+  int sum = kDensity;
+  if (which.operation != Operation::pdf_reflection) sum += kShadowing;
+  if (which.operation != Operation::evaluate_reflection) {
+    switch (*which.sampler) {
+      case Sampler::ndf: sum += 5; break;
+      case Sampler::heitz:
+      case Sampler::cap: sum += 2; break;
+      case Sampler::bounded: sum += 2 + kBound; break;
+      case Sampler::exact: sum += 1 + cone; break;
+    }
+  }
+  return sum;
+}
+
+}  // namespace facetwise::bench

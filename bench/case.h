@@ -1,0 +1,52 @@
+// One benchmark: what is measured, by which implementation, on what inputs.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "facetwise/bench.h"
+
+namespace facetwise::bench {
+
+enum class Implementation { scalar, one_lane, simd, simd_threads, remote };
+// BenchResult::inputs says what they are.
+enum class Inputs { columns, one_roughness, generator, backfacing };
+
+std::string_view name(Implementation);
+std::string_view name(Inputs);
+
+struct Case {
+  Operation operation = Operation::sample_reflection;
+  std::optional<Sampler> sampler;  // nothing where the operation has no use for one
+  float alpha_x = 0.3f, alpha_y = 0.3f;
+  std::size_t batch = 65536;
+  Implementation implementation = Implementation::simd;
+  Inputs inputs = Inputs::columns;
+
+  bool is_sampling() const {
+    return operation == Operation::sample_reflection || operation == Operation::sample_normal;
+  }
+  bool uses_u3() const { return sampler && is_sampling() && facetwise::uses_u3(*sampler); }
+  // Float columns with a value per lane that are read, and that are written.
+  int input_columns() const;
+  int output_columns() const;
+  // True if `other` differs in the implementation alone, so that their times make a ratio.
+  bool comparable(const Case& other) const;
+};
+
+// The result of a case, with everything but its measurements filled in.
+BenchResult describe(const Case& which);
+
+// What options.suite and options.filter choose, comparable cases together; remote ones only if there is a
+// server. InvalidArgument for a filter that is no regular expression or matches nothing.
+absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options);
+
+// Floating-point operations of a lane with i_z > 0 that ends up accepted, counted by hand from the kernels'
+// formulas: + - * / and sqrt are one, a fused multiply-add two; comparisons, selects, integers (random numbers)
+// and conversions are none.
+int flops(const Case& which);
+
+}  // namespace facetwise::bench

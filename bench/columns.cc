@@ -1,0 +1,137 @@
+#include "columns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace facetwise::bench {
+namespace {
+
+// SplitMix64 (Steele et al. 2014) as a hash of the lane and the column: uniform in [0, 1).
+float uniform(std::uint64_t lane, std::uint64_t column) {
+  std::uint64_t z = (column << 40 | lane) * 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-24f;
+}
+
+// Bytes that can be had without swapping; "unlimited" where the system does not say.
+std::uint64_t available_memory() {
+  std::ifstream meminfo("/proc/meminfo");
+  std::string key;
+  std::uint64_t kilobytes = 0;
+  for (std::string rest; meminfo >> key >> kilobytes && std::getline(meminfo, rest);)
+    if (key == "MemAvailable:") return kilobytes * 1024;
+  return std::numeric_limits<std::uint64_t>::max();
+}
+
+}  // namespace
+
+absl::StatusOr<Columns> Columns::make(std::size_t lanes) {
+  Columns columns;
+  columns.lanes_ = lanes;
+  // Five cache lines between columns, so that the same lane of two columns is never at the same place of a page.
+  columns.stride_ = (lanes + 15) / 16 * 16 + 80;
+  const std::uint64_t bytes = (kInputs + kOutputs) * columns.stride_ * sizeof(float);
+  if (bytes > available_memory() / 10 * 9)
+    return absl::ResourceExhaustedError(absl::StrCat("batch: columns of ", lanes, " lanes take ", bytes >> 20,
+                                                     " MiB, more than this machine has free; filter for "
+                                                     "smaller batches"));
+  columns.data_.reset(new (std::align_val_t{64}) float[(kInputs + kOutputs) * columns.stride_]());
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    const float z = std::max(uniform(lane, 0), 0x1p-24f);
+    const float r = std::sqrt((1 - z) * (1 + z));
+    const float phi = 2 * std::numbers::pi_v<float> * uniform(lane, 1);
+    columns.input(kIx)[lane] = r * std::cos(phi);
+    columns.input(kIy)[lane] = r * std::sin(phi);
+    columns.input(kIz)[lane] = z;
+    columns.input(kIzBackfacing)[lane] = uniform(lane, 2) < 0.1f ? -z : z;
+    columns.input(kU1)[lane] = uniform(lane, 3);
+    columns.input(kU2)[lane] = uniform(lane, 4);
+    columns.input(kU3)[lane] = uniform(lane, 5);
+  }
+  return columns;
+}
+
+absl::Status Columns::set_roughness(float alpha_x, float alpha_y, std::size_t lanes, bool queries) {
+  if (alpha_x != alpha_x_ || alpha_y != alpha_y_) rough_lanes_ = query_lanes_ = 0;
+  alpha_x_ = alpha_x;
+  alpha_y_ = alpha_y;
+  if (rough_lanes_ < lanes) {
+    std::fill_n(input(kAlphaX), lanes, alpha_x);
+    std::fill_n(input(kAlphaY), lanes, alpha_y);
+    rough_lanes_ = lanes;
+  }
+  if (queries && query_lanes_ < lanes) {
+    Batch sampling = batch({.sampler = Sampler::cap, .batch = lanes});
+    sampling.out = {};
+    sampling.out.outgoing = {
+        {input(kOx), lanes}, {input(kOy), lanes}, {input(kOz), lanes}};
+    if (auto sampled = sample_reflection(sampling); !sampled.ok()) return sampled.status();
+    query_lanes_ = lanes;
+  }
+  return absl::OkStatus();
+}
+
+void Columns::set_mixed_roughness(std::size_t lanes) {
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    input(kAlphaX)[lane] = 0.05f + 0.95f * uniform(lane, 6);
+    input(kAlphaY)[lane] = 0.05f + 0.95f * uniform(lane, 7);
+  }
+  alpha_x_ = alpha_y_ = 0;
+  rough_lanes_ = query_lanes_ = 0;
+}
+
+Batch Columns::batch(const Case& which) const {
+  const std::size_t lanes = which.batch;
+  const auto in = [&](Index index) { return Column<float>(input(index), lanes); };
+  const auto out = [&](int index) { return OutputColumn<float>(output(index), lanes); };
+  Batch batch;
+  batch.lanes = lanes;
+  if (which.sampler) batch.sampler = *which.sampler;
+  batch.incident = {in(kIx), in(kIy), in(which.inputs == Inputs::backfacing ? kIzBackfacing : kIz)};
+  if (which.inputs == Inputs::one_roughness) {
+    batch.alpha_x = which.alpha_x;
+    batch.alpha_y = which.alpha_y;
+  } else {
+    batch.alpha_x = in(kAlphaX);
+    batch.alpha_y = in(kAlphaY);
+  }
+  if (which.is_sampling()) {
+    if (which.inputs == Inputs::generator) {
+      batch.generator = Generator{.seed = 1, .dimension = 0, .id = {}, .first_id = 0};
+    } else {
+      batch.u1 = in(kU1);
+      batch.u2 = in(kU2);
+      if (which.uses_u3()) batch.u3 = in(kU3);
+    }
+  } else if (which.operation != Operation::masking) {
+    batch.outgoing = {in(kOx), in(kOy), in(kOz)};
+  }
+  switch (which.operation) {
+    case Operation::sample_normal:
+      batch.out.normal = {out(0), out(1), out(2)};
+      batch.out.pdf = out(3);
+      break;
+    case Operation::sample_reflection:
+      batch.out.outgoing = {out(0), out(1), out(2)};
+      batch.out.pdf = out(3);
+      break;
+    case Operation::pdf_reflection: batch.out.pdf = out(0); break;
+    case Operation::evaluate_reflection: batch.out.value = out(0); break;
+    case Operation::evaluate_and_pdf:
+      batch.out.value = out(0);
+      batch.out.pdf = out(1);
+      break;
+    case Operation::masking: batch.out.masking = out(0); break;
+  }
+  return batch;
+}
+
+}  // namespace facetwise::bench

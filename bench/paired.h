@@ -1,0 +1,53 @@
+// Ratios of times that hold on a noisy machine: both are measured in turn, A B A B, and the median of the
+// rounds' ratios is taken.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+namespace facetwise::bench {
+
+struct Paired {
+  double a = 0, b = 0;  // median seconds of one call
+  double ratio = 0;     // median of a / b
+};
+
+inline double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Seconds of one call, over `calls` calls.
+template <class Call>
+double time_calls(const Call& call, int calls) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  for (int k = 0; k < calls; ++k) call();
+  return std::chrono::duration<double>(Clock::now() - start).count() / calls;
+}
+
+// Calls that take `seconds`, at least one.
+template <class Call>
+int calls_for(const Call& call, double seconds) {
+  call();
+  const double once = std::max(time_calls(call, 1), 1e-9);
+  const int trial = static_cast<int>(std::clamp(seconds / once / 4, 1.0, 1e6));
+  return static_cast<int>(std::clamp(seconds / time_calls(call, trial), 1.0, 1e6));
+}
+
+// Each side runs `seconds` a round, but at least once. `rounds` is odd.
+template <class A, class B>
+Paired measure_paired(const A& a, const B& b, int rounds, double seconds) {
+  const int calls_a = calls_for(a, seconds), calls_b = calls_for(b, seconds);
+  std::vector<double> times_a, times_b, ratios;
+  for (int round = 0; round < rounds; ++round) {
+    times_a.push_back(time_calls(a, calls_a));
+    times_b.push_back(time_calls(b, calls_b));
+    ratios.push_back(times_a.back() / times_b.back());
+  }
+  return {median_of(times_a), median_of(times_b), median_of(ratios)};
+}
+
+}  // namespace facetwise::bench

@@ -1,0 +1,20 @@
+// The performance that facetwise sets itself to reach, measured.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "columns.h"
+#include "facetwise/bench.h"
+
+namespace facetwise::bench {
+
+// Lanes that `columns` must have: 16 M for the batch that does not fit into a cache.
+inline constexpr std::size_t kTargetLanes = std::size_t{1} << 24;
+
+// Measures each and appends to report.targets. Stops with Cancelled when `step()` returns false.
+absl::Status measure_targets(const BenchOptions& options, Columns& columns, const std::function<bool()>& step,
+                             BenchReport& report);
+
+}  // namespace facetwise::bench
