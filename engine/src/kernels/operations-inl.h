@@ -206,7 +206,7 @@ struct Sample {
     if constexpr (Sampler::kExact) oz = Max(oz, Set(d, kRim));
 
     auto occluded = kNormal ? NoLanes(d) : oz <= zero;
-    if constexpr (!Sampler::kVisible) occluded = Or(occluded, drawn.im <= zero);
+    if constexpr (!Sampler::kVisible) occluded = Or(occluded, drawn.im <= Set(d, kSmallestIm));
     const auto accepted = Not(occluded);
 
     // p(o) = D(m) / (4 N), D(m) = (M.M)^2 / (|m_hat|^4 pi ax ay); with a half vector |m_hat|^2 / M.M is rho.
@@ -291,25 +291,27 @@ struct Query {
 
     const V hx = i.x + x, hy = i.y + y, hz = i.z + z;
     const V h2 = Dot(hx, hy, hz, hx, hy, hz);
-    const V ih = Dot(i.x, i.y, i.z, hx, hy, hz);
     // o = -i to float's last bits has no half vector.
     const auto above = z > zero;
-    const auto reached = And(And(above, hz > zero), And(h2 > Set(d, 0x1p-40f), ih > zero));
+    const auto reached = And(And(above, hz > zero), h2 > Set(d, 0x1p-40f));
     // Lanes that no microfacet reaches compute with the half vector (0, 0, 1).
     const V mx = IfThenElseZero(reached, hx), my = IfThenElseZero(reached, hy), mz = Select(reached, hz, one);
     const V m2 = Select(reached, h2, one);
     const V q = DensityRoot(mx, my, mz, m2, i.ax, i.ay);
     const V numerator = IfThenElseZero(reached, q * q);
     const V denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay);
+    const V largest = Set(d, 3e38f);  // a density can be beyond the floats straight below a smooth surface
 
     if constexpr (kPdf) {
-      const V two_n = Sampler::TwoN(d, i, Select(reached, ih, one), mz);
-      StoreU(exceptions.Output(numerator / (denominator * two_n), zero), d, tile.out[kOutPdf] + lane);
+      // i.h is |h|^2 / 2 for unit vectors; far less only by the tolerance of their length.
+      const V ih = Max(Dot(i.x, i.y, i.z, mx, my, mz), m2 * Set(d, 0x1p-12f));
+      const V pdf = Min(numerator / (denominator * Sampler::TwoN(d, i, ih, mz)), largest);
+      StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
     }
     if constexpr (kValue) {
       V lit, all;
       ShadowingWeight(d, i, x, y, z, tile.uncorrelated, lit, all);
-      const V value = numerator / (denominator * i.t) * IfThenElseZero(above, lit / all);
+      const V value = Min(numerator / (denominator * i.t), largest) * IfThenElseZero(above, lit / all);
       StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
     }
     exceptions.Finish(tile, lane, Not(above), statistics);

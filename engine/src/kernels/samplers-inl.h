@@ -23,8 +23,8 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// i.M of visible normals is kept above this, where rounding could make it 0 or negative.
-inline constexpr float kSmallestIm = 0x1p-100f;
+// i.M of visible normals is kept above this, where rounding could make it 0 or negative. `ndf` rejects below.
+inline constexpr float kSmallestIm = 0x1p-80f;
 
 template <class D>
 struct Drawn {
@@ -114,12 +114,11 @@ struct Heitz {
 
     const V radial_xy = Fma(tw, s_hat, Neg(t2 * c));
     const V hx = Fma(radial_xy, ex, Neg(t1 * ey)), hy = Fma(radial_xy, ey, t1 * ex);
-    // m_hat_z = t2 s_hat + t_w c; behind it cancels, and is s p (2R - s (2R + b)) / (t2 s_hat + t_w |c|).
+    // m_hat_z = t2 s_hat + t_w c; behind it cancels, and is s p (2R |c| + s p) / (t2 s_hat + t_w |c|).
     const V sum = Fma(t2, s_hat, tw * Abs(c));
     V hz = sum;
     if (!i.all_front) {
-      const V two_r = big_r + big_r;
-      hz = Select(i.front, hz, s * p * NegFma(s, two_r + b, two_r) / sum);
+      hz = Select(i.front, hz, s * p * Fma(big_r + big_r, Abs(c), s * p) / sum);
     }
     Unstretch(i, hx, hy, hz, drawn);
     drawn.im = i.nu * tw;
@@ -137,7 +136,8 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   const V height = t * u1;  // nu (1 - o_hat_z)
   const V radius = Sqrt(height * (i.nu + i.nu - height));
   const V hx = Fma(radius, cos, i.wx), hy = Fma(radius, sin, i.wy);
-  const V hz = Fma(t, Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
+  V hz = Fma(t, Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
+  if (!i.all_front) hz = Max(hz, Set(d, 0x1p-62f));  // t can be so small that hz^2 underflows
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but this keeps o of unit length where m_hat is short and its rounding counts.
   drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
