@@ -121,7 +121,8 @@ struct Heitz {
       hz = Select(i.front, hz, s * p * Fma(big_r + big_r, Abs(c), s * p) / sum);
     }
     Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = i.nu * tw;
+    // nu t_w, but by M itself, so that o is its reflection to the last digits.
+    drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
     drawn.two_n = i.t;
   }
 };
@@ -139,7 +140,7 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   V hz = Fma(t, Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
   if (!i.all_front) hz = Max(hz, Set(d, 0x1p-62f));  // t can be so small that hz^2 underflows
   Unstretch(i, hx, hy, hz, drawn);
-  // Equal to |m_hat|^2 / 2, but this keeps o of unit length where m_hat is short and its rounding counts.
+  // Equal to |m_hat|^2 / 2, but by M itself, so that o is its reflection even where m_hat is short.
   drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
   drawn.two_n = t;
 }
