@@ -21,10 +21,11 @@ void add_model(CLI::App& app, Model& model) {
 
 void EngineArguments::add_remote(CLI::App& app) {
   app.add_option("--remote", remote,
-                 "Servers that run it instead of this machine: unix:PATH or HOST:PORT, several separated by commas")
+                 "Servers that run it instead of this machine: unix:PATH or HOST:PORT, separated by commas")
       ->delimiter(',')
       ->expected(1, -1)
-      ->type_name("ADDRESS[,ADDRESS...]");
+      ->allow_extra_args(false)  // so that `--remote A B` is an error
+      ->option_text("ADDRESS[,ADDRESS...]");
 }
 
 void EngineArguments::add_target(CLI::App& app) {

@@ -81,7 +81,7 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
     auto* seed = command.add_option("--seed", call.seed, "Seed of the generator of u1 u2 u3")->type_name("N");
     command.add_option("--first-id", call.first_id, "The first lane's id in the generator; default 0")
         ->needs(seed)
-        ->type_name("N");
+        ->option_text("N");
   }
   arguments->engine.add_remote(command);
   arguments->engine.add_target(command);

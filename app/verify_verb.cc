@@ -13,6 +13,7 @@
 #include "app/table/output_file.h"
 #include "app/verbs.h"
 #include "app/verify.h"
+#include "facetwise/tune_malloc.h"
 
 namespace facetwise::app {
 namespace {
@@ -128,6 +129,7 @@ struct VerifyVerb {
 
   int run() {
     flush_denormals();
+    tune_malloc();
     if (mesh.empty()) {
       auto found = scene::default_mesh();
       if (!found.ok()) return fail("verify", found.status());
@@ -174,13 +176,13 @@ Examples:
   facetwise verify --remote unix:/tmp/facetwise.sock
   facetwise verify --remote host1:7777,host2:7777 --sampler exact --batches 4 --mesh bunny.ply)");
   arguments->engine.add_remote(command);
-  command.get_option("--remote")->required();
+  command.get_option("--remote")->required()->option_text("ADDRESS[,ADDRESS...] (required)");
   command.add_option("--mesh", arguments->mesh, "Any format that assimp reads; default 2CylinderEngine.glb of assimp-testmodels")
       ->type_name("FILE");
   command.add_option("--batches", arguments->options.batches, "Batches to send; default 16")
-      ->check(CLI::PositiveNumber)->type_name("N");
+      ->check(CLI::PositiveNumber)->option_text("N");
   command.add_option("--lanes", arguments->options.lanes, "Lanes in a batch; default 1048576")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 28))->type_name("N");
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 28))->option_text("N");
   arguments->options.samplers.assign(all_samplers().begin(), all_samplers().end());
   command
       .add_option_function<std::string>(

@@ -25,6 +25,8 @@ std::string_view trim(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
+bool blank(std::string_view text) { return text.find_first_not_of(" \t\r\n") == std::string_view::npos; }
+
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> values;
   for (;;) {
@@ -63,7 +65,7 @@ class CsvInput final : public InputTable {
  public:
   absl::Status parse(const std::string& path, std::string_view text) {
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-    if (trim(text).empty()) return invalid("{}: empty; the first line names the columns", path);
+    if (blank(text)) return invalid("{}: empty; the first line names the columns", path);
     for (const std::string_view name : split(next_line(text))) {
       if (name.empty()) return invalid("{}, line 1: a column without a name", path);
       if (std::find(names_.begin(), names_.end(), name) != names_.end())
@@ -75,7 +77,7 @@ class CsvInput final : public InputTable {
     for (auto& column : columns_) column.reserve(expected);
     for (std::size_t number = 2; !text.empty(); ++number) {
       const std::string_view line = next_line(text);
-      if (trim(line).empty() && text.find_first_not_of(" \t\r\n") == std::string_view::npos) break;
+      if (blank(line) && blank(text)) break;
       if (auto status = parse_row(path, number, line); !status.ok()) return status;
     }
     return absl::OkStatus();

@@ -34,7 +34,7 @@ absl::StatusOr<OutputFile> OutputFile::create(const std::string& path) {
   const fs::file_status status = fs::status(target, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) return invalid("{}: not a regular file", path);
   file.target_ = target.string();
-  file.temporary_ = (target.parent_path() / ("." + target.filename().string() + ".XXXXXX")).string();
+  file.temporary_ = (target.parent_path() / fmt::format(".{}.XXXXXX", target.filename().string())).string();
   file.descriptor_ = ::mkostemp(file.temporary_.data(), O_CLOEXEC);
   if (file.descriptor_ < 0) {
     file.temporary_.clear();

@@ -1,0 +1,90 @@
+// info: what this program, this machine or a server is.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "app/arguments.h"
+#include "app/errors.h"
+#include "app/machine.h"
+#include "app/verbs.h"
+#include "facetwise/v1/sampler.grpc.pb.h"
+
+namespace facetwise::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json local_info() {
+  Json targets = Json::array();
+  for (const Target target : available_targets()) targets.push_back(name(target));
+  const Target best = *resolve(Target::best);
+  return {{"version", version()},
+          {"target", name(best)},
+          {"available_targets", targets},
+          {"vector_lanes", vector_lanes(best)},
+          {"cpu", cpu_model()},
+          {"cores", usable_cores()},
+          {"memory_bytes", memory_bytes()}};
+}
+
+absl::StatusOr<Json> remote_info(const std::string& address) {
+  constexpr std::chrono::seconds kPatience{5};
+  const auto stub = v1::Sampler::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kPatience);
+  v1::InfoResponse info;
+  const grpc::Status status = stub->Info(&context, {}, &info);
+  if (!status.ok()) return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
+  Json targets = Json::array();
+  for (const std::string& target : info.available_targets()) targets.push_back(target);
+  return Json{{"version", info.version()},
+              {"target", info.target()},
+              {"available_targets", targets},
+              {"cpu", info.cpu()},
+              {"threads", info.threads()},
+              {"max_message_bytes", info.max_message_bytes()},
+              {"benchmark_allowed", info.benchmark_allowed()}};
+}
+
+void print(const Json& info) {
+  for (const auto& [key, value] : info.items()) {
+    std::string text;
+    if (value.is_array())
+      text = fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), " "));
+    else
+      text = value.is_string() ? value.get<std::string>() : value.dump();
+    fmt::print("{:<18} {}\n", key, text);
+  }
+}
+
+}  // namespace
+
+Verb add_info(CLI::App& app) {
+  struct Arguments {
+    std::string remote;
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App& command = *app.add_subcommand("info", "Print the version, the instruction sets and the machine");
+  command.footer("Examples:\n  facetwise info\n  facetwise info --json --remote unix:/tmp/facetwise.sock");
+  command.add_option("--remote", arguments->remote, "A server's instead of this machine's: unix:PATH or HOST:PORT")
+      ->option_text("ADDRESS");
+  command.add_flag("--json", arguments->json, "As JSON");
+  return {&command, [arguments] {
+            const absl::StatusOr<Json> info =
+                arguments->remote.empty() ? absl::StatusOr<Json>(local_info()) : remote_info(arguments->remote);
+            if (!info.ok()) return fail("info", info.status());
+            if (arguments->json)
+              fmt::print("{}\n", info->dump(1));
+            else
+              print(*info);
+            return kDone;
+          }};
+}
+
+}  // namespace facetwise::app

@@ -1,0 +1,80 @@
+// serve: the library's calls for other processes and machines.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+#include "app/arguments.h"
+#include "app/verbs.h"
+#include "facetwise/server.h"
+
+namespace facetwise::app {
+namespace {
+
+constexpr std::size_t kMiB = std::size_t{1} << 20;
+
+struct ServeVerb {
+  ServerOptions options;
+  std::size_t max_message_mib = 16, max_mib_in_flight = 1024;
+  int drain_seconds = 10;
+  std::string unix_mode = "0600";
+
+  int run() {
+    options.max_message_bytes = max_message_mib * kMiB;
+    options.max_bytes_in_flight = max_mib_in_flight * kMiB;
+    options.drain_timeout = std::chrono::seconds(drain_seconds);
+    options.unix_mode = static_cast<unsigned>(std::stoul(unix_mode, nullptr, 8));
+    const absl::Status status = serve(options, [&](const Server& server) {
+      const Target target = *resolve(options.execution.target);
+      for (const std::string& address : server.addresses())
+        fmt::print("facetwise {} listens on {} ({} kernels)\n", version(), address, name(target));
+      std::fflush(stdout);
+    });
+    return status.ok() ? kDone : fail("serve", status);
+  }
+};
+
+std::string check_mode(const std::string& text) {
+  const bool octal = !text.empty() && text.size() <= 4 && text.find_first_not_of("01234567") == std::string::npos;
+  return octal && std::stoul(text, nullptr, 8) <= 0777 ? "" : fmt::format("\"{}\" is not a mode such as 0660", text);
+}
+
+}  // namespace
+
+Verb add_serve(CLI::App& app) {
+  auto arguments = std::make_shared<ServeVerb>();
+  ServerOptions& options = arguments->options;
+  CLI::App& command = *app.add_subcommand("serve", "Answer the library's calls over gRPC until SIGTERM");
+  command.footer(R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol is
+proto/facetwise/v1/sampler.proto; health checks and reflection are on. There is no authentication: listen
+on a Unix socket, on 127.0.0.1, or on a network whose every user may call.
+
+Examples:
+  facetwise serve --listen unix:/tmp/facetwise.sock
+  facetwise serve --listen 127.0.0.1:7777 --listen unix:/run/facetwise.sock --unix-mode 0660 --threads 8)");
+  command.add_option("--listen", options.listen, "Where to listen; may be repeated. Port 0 takes a free one, which is printed")
+      ->required()
+      ->allow_extra_args(false)
+      ->option_text("unix:PATH|HOST:PORT (required)");
+  command.add_option("--threads", options.threads, "Threads that compute; default as many as there are cores")
+      ->check(CLI::Range(1, 4096))->option_text("N");
+  command.add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
+      ->check(CLI::Range(1, 2047))->option_text("N");
+  command.add_option("--max-mib-in-flight", arguments->max_mib_in_flight,
+                     "Requests and responses held at once; beyond, calls get RESOURCE_EXHAUSTED; default 1024")
+      ->check(CLI::Range(1, 1 << 24))->option_text("N");
+  command.add_option("--max-calls", options.max_calls,
+                     "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
+      ->check(CLI::Range(1, 1 << 20))->option_text("N");
+  command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
+      ->check(check_mode)->option_text("MODE");
+  command.add_option("--drain-seconds", arguments->drain_seconds, "Longest wait for calls in flight at the end; default 10")
+      ->check(CLI::Range(0, 86400))->option_text("N");
+  command.add_flag("--allow-benchmark", options.allow_benchmark, "Let clients run benchmarks on this machine");
+  add_named(command, "--target", options.execution.target, parse_target, "Instruction set of the kernels; default best",
+            "best|scalar|avx2|avx3|neon");
+  return {&command, [arguments] { return arguments->run(); }};
+}
+
+}  // namespace facetwise::app
