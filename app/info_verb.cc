@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <grpcpp/grpcpp.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
@@ -10,14 +11,18 @@
 
 #include "app/arguments.h"
 #include "app/errors.h"
-#include "app/machine.h"
 #include "app/verbs.h"
+#include "bench/machine.h"
 #include "facetwise/v1/sampler.grpc.pb.h"
 
 namespace facetwise::app {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+std::uint64_t memory_bytes() {
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
+}
 
 Json local_info() {
   Json targets = Json::array();
@@ -27,8 +32,8 @@ Json local_info() {
           {"target", name(best)},
           {"available_targets", targets},
           {"vector_lanes", vector_lanes(best)},
-          {"cpu", cpu_model()},
-          {"cores", usable_cores()},
+          {"cpu", bench::cpu_model()},
+          {"cores", bench::usable_cores()},
           {"memory_bytes", memory_bytes()}};
 }
 

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "app/arguments.h"
+#include "app/benchmark_messages.h"
 #include "app/verbs.h"
 #include "facetwise/server.h"
 
@@ -25,6 +26,7 @@ struct ServeVerb {
     options.max_bytes_in_flight = max_mib_in_flight * kMiB;
     options.drain_timeout = std::chrono::seconds(drain_seconds);
     options.unix_mode = static_cast<unsigned>(std::stoul(unix_mode, nullptr, 8));
+    options.benchmark = benchmark_runner(options.execution.target, options.threads);
     const absl::Status status = serve(options, [&](const Server& server) {
       const Target target = *resolve(options.execution.target);
       for (const std::string& address : server.addresses())

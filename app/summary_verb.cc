@@ -48,7 +48,7 @@ struct Table {
   explicit Table(const Json& report) {
     for (const Json& result : report.at("results")) {
       const auto found = std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
-      if (found == kImplementations.end()) continue;
+      if (found == kImplementations.end() || result.value("inputs", "columns") != "columns") continue;
       const Json& alpha = result.at("alpha");
       Row& row = rows[{result.at("operation"), result.at("sampler")}][{alpha.at(0), alpha.at(1)}];
       double& rate = row.rate[static_cast<std::size_t>(found - kImplementations.begin())];

@@ -1,0 +1,119 @@
+// serve, info, verify and help, as processes.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "facetwise/engine.h"
+#include "tests/app/command.h"
+
+namespace facetwise::test {
+namespace {
+
+TEST(Help, EveryVerbExplainsItselfWithAnExample) {
+  const auto all = facetwise({"--help"});
+  ASSERT_EQ(all.code, 0);
+  for (const std::string verb : {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info"}) {
+    EXPECT_NE(all.out.find("\n  " + verb + " "), std::string::npos) << verb;
+    const auto help = facetwise({verb, "--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("\nExample"), std::string::npos) << verb;
+    EXPECT_NE(help.out.find("\n  facetwise " + verb), std::string::npos) << verb;
+  }
+}
+
+TEST(Version, IsTheLibrarys) {
+  const auto result = facetwise({"--version"});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_EQ(result.out, std::string(version()) + "\n");
+}
+
+TEST(Info, TellsTheTargetThatRuns) {
+  const auto result = facetwise({"info", "--json"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto info = nlohmann::json::parse(result.out);
+  EXPECT_EQ(info["version"], version());
+  EXPECT_EQ(info["target"], name(available_targets().front()));
+  EXPECT_EQ(info["available_targets"].size(), available_targets().size());
+  EXPECT_EQ(info["vector_lanes"], vector_lanes(available_targets().front()));
+  EXPECT_GE(info["cores"], 1);
+  EXPECT_GT(info["memory_bytes"], 1 << 20);
+  const auto text = facetwise({"info"});
+  EXPECT_NE(text.out.find(info["cpu"].get<std::string>()), std::string::npos);
+}
+
+TEST(Serve, AnswersInfoWithItsOptionsAndDrainsOnSigterm) {
+  const Directory directory;
+  Server server(directory, "s.sock", {"--threads", "1", "--max-message-mib", "3", "--target", "scalar"});
+  const auto result = facetwise({"info", "--json", "--remote", server.address()});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto info = nlohmann::json::parse(result.out);
+  EXPECT_EQ(info["version"], version());
+  EXPECT_EQ(info["target"], "scalar");
+  EXPECT_EQ(info["threads"], 1);
+  EXPECT_EQ(info["max_message_bytes"], 3 << 20);
+  EXPECT_EQ(info["benchmark_allowed"], false);
+  EXPECT_EQ(server.stop(), 0);
+  const auto gone = facetwise({"info", "--remote", server.address()});
+  EXPECT_EQ(gone.code, 1);
+  EXPECT_NE(gone.err.find("server " + server.address()), std::string::npos) << gone.err;
+}
+
+TEST(Serve, ListensOnSeveralAddressesAndPrintsThem) {
+  const Directory directory;
+  Server server(directory, "s.sock", {"--listen", "127.0.0.1:0"});
+  const std::string out = read_file(directory.path("s.sock.out"));
+  const auto begin = out.find("127.0.0.1:");
+  ASSERT_NE(begin, std::string::npos) << out;
+  const std::string address = out.substr(begin, out.find(' ', begin) - begin);
+  const auto result = facetwise({"info", "--remote", address});
+  EXPECT_EQ(result.code, 0) << result.err;
+}
+
+TEST(Serve, SaysWhatItCannotDo) {
+  const auto expect = [](const std::vector<std::string>& arguments, int code, const std::string& message) {
+    const auto result = facetwise(arguments);
+    EXPECT_EQ(result.code, code);
+    EXPECT_NE(result.err.find(message), std::string::npos) << result.err;
+  };
+  const Directory directory;
+  const Server server(directory, "s.sock");
+  expect({"serve", "--listen", server.address()}, 1, directory.path("s.sock"));
+  expect({"serve", "--listen", "nowhere"}, 1, "nowhere");
+  expect({"serve", "--listen", "unix:" + directory.path("t.sock"), "--unix-mode", "8"}, 2, "\"8\" is not a mode");
+  expect({"serve", "--listen", "unix:" + directory.path("t.sock"), "--threads", "0"}, 2, "--threads");
+}
+
+TEST(VerifyVerb, ComparesWithAServer) {
+  const Directory directory;
+  const Server server(directory, "s.sock", {"--target", "scalar"});
+  const std::string path = directory.path("verify.json");
+  const auto result = facetwise({"verify", "--remote", server.address(), "--lanes", "30000", "--json", path});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_NE(result.out.find("121496 triangles"), std::string::npos) << result.out;
+  const auto json = nlohmann::json::parse(read_file(path));
+  EXPECT_EQ(json["equal"], true);
+  EXPECT_EQ(json["triangles"], 121496);
+  EXPECT_EQ(json["lanes"], 16 * 30000);
+  EXPECT_GE(json["hits"].get<double>(), 0.5 * json["rays"].get<double>());
+  const double backfacing = json["backfacing"].get<double>() / json["lanes"].get<double>();
+  EXPECT_GT(backfacing, 0.02);
+  EXPECT_LT(backfacing, 0.30);
+  ASSERT_EQ(json["batches"].size(), 16u);
+  ASSERT_EQ(json["reflections"].size(), 5u);
+  // In the samplers' order, from the most rejections to none.
+  std::vector<std::uint64_t> occluded;
+  for (const auto& sampler : json["reflections"]) occluded.push_back(sampler["occluded"]);
+  EXPECT_GT(occluded[0], occluded[1]);  // ndf, heitz
+  EXPECT_GT(occluded[2], occluded[3]);  // cap, bounded
+  EXPECT_GT(occluded[3], 0u);
+  EXPECT_EQ(occluded[4], 0u);  // exact
+}
+
+TEST(VerifyVerb, NamesAMissingMesh) {
+  const auto result = facetwise({"verify", "--remote", "unix:/none", "--mesh", "/none.obj"});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_NE(result.err.find("/none.obj: "), std::string::npos) << result.err;
+}
+
+}  // namespace
+}  // namespace facetwise::test
