@@ -183,7 +183,11 @@ class Stage {
     for (std::size_t c = 0; c < plan_.out_count; ++c) {
       const auto& [k, column] = plan_.out[c];
       if (tile_.out[k] != out_[k]) continue;
-      for (std::size_t j = 0; j < tile_.lanes; ++j) (*column)[lane_at(begin + j)] = out_[k][j];
+      if (column->stride() == sizeof(float) && !plan_.active) {
+        std::copy_n(out_[k], tile_.lanes, column->data() + begin);
+      } else {
+        for (std::size_t j = 0; j < tile_.lanes; ++j) (*column)[lane_at(begin + j)] = out_[k][j];
+      }
     }
     if (tile_.status == status_)
       for (std::size_t j = 0; j < tile_.lanes; ++j) plan_.status[lane_at(begin + j)] = status_[j];

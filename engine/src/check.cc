@@ -137,34 +137,35 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
 
 absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
   struct Use {
-    absl::string_view field;
+    const std::string_view* field;
     MemoryUse memory;
   };
+  static constexpr std::string_view kId = "generator.id", kActive = "active", kStatus = "out.status";
   Use inputs[kInputs + 2], outputs[kOutputs + 1];
   std::size_t input_count = 0, output_count = 0;
   for (std::size_t k = 0; k < kInputs; ++k)
     if (columns.in[k]->present())
-      inputs[input_count++] = {view(input_fields()[k].name), memory_use(*columns.in[k])};
+      inputs[input_count++] = {&input_fields()[k].name, memory_use(*columns.in[k])};
   if (batch.generator && batch.generator->id.present())
-    inputs[input_count++] = {"generator.id", memory_use(batch.generator->id)};
+    inputs[input_count++] = {&kId, memory_use(batch.generator->id)};
   if (batch.active)
-    inputs[input_count++] = {"active", memory_use(batch.active->data(), batch.active->size(), 4, 4)};
+    inputs[input_count++] = {&kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4)};
   for (std::size_t k = 0; k < kOutputs; ++k)
     if (columns.out[k]->present())
-      outputs[output_count++] = {view(output_fields()[k].name), memory_use(*columns.out[k])};
-  if (batch.out.status.present()) outputs[output_count++] = {"out.status", memory_use(batch.out.status)};
+      outputs[output_count++] = {&output_fields()[k].name, memory_use(*columns.out[k])};
+  if (batch.out.status.present()) outputs[output_count++] = {&kStatus, memory_use(batch.out.status)};
 
   for (std::size_t k = 0; k < output_count; ++k) {
     for (std::size_t j = 0; j < input_count; ++j) {
       if (!ranges_meet(outputs[k].memory, inputs[j].memory)) continue;
-      const bool same_lanes = outputs[k].memory == inputs[j].memory && inputs[j].field != "active";
+      const bool same_lanes = outputs[k].memory == inputs[j].memory && inputs[j].field != &kActive;
       if (!same_lanes && share_memory(outputs[k].memory, inputs[j].memory))
-        return invalid(outputs[k].field, absl::StrCat("overlaps ", inputs[j].field, ": an output may be an input's ",
+        return invalid(view(*outputs[k].field), absl::StrCat("overlaps ", view(*inputs[j].field), ": an output may be an input's ",
                                                       "own lanes or separate memory"));
     }
     for (std::size_t j = 0; j < k; ++j)
       if (ranges_meet(outputs[k].memory, outputs[j].memory) && share_memory(outputs[k].memory, outputs[j].memory))
-        return invalid(outputs[k].field, absl::StrCat("overlaps ", outputs[j].field));
+        return invalid(view(*outputs[k].field), absl::StrCat("overlaps ", view(*outputs[j].field)));
   }
   return absl::OkStatus();
 }

@@ -13,14 +13,14 @@ namespace facetwise {
 
 // The memory of a column, for finding overlaps.
 struct MemoryUse {
-  std::uintptr_t begin = 0, end = 0;
-  std::size_t stride = 0, width = 0;  // stride 0: one value
+  std::uintptr_t begin, end;
+  std::size_t stride, width;  // stride 0: one value
   bool operator==(const MemoryUse&) const = default;
 };
 
 inline MemoryUse memory_use(const void* data, std::size_t count, std::size_t stride, std::size_t width) {
   const auto begin = reinterpret_cast<std::uintptr_t>(data);
-  if (count == 0) return {};
+  if (count == 0) return {0, 0, 0, width};
   return {begin, begin + (count - 1) * stride + width, count > 1 ? stride : 0, width};
 }
 template <class Column>
