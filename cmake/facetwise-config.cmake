@@ -1,0 +1,5 @@
+include(CMakeFindDependencyMacro)
+find_dependency(absl CONFIG)
+find_dependency(hwy CONFIG)
+find_dependency(TBB CONFIG)
+include(${CMAKE_CURRENT_LIST_DIR}/facetwise.cmake)
