@@ -63,13 +63,12 @@ std::vector<Case> standard_cases() {
     for (const Sampler sampler : all_samplers())
       list.add({.sampler = sampler, .alpha_x = kAlphas[k].first, .alpha_y = kAlphas[k].second});
   for (const Sampler sampler : kReflectionSamplers)
-    for (const Inputs inputs : {Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
-      list.add({.sampler = sampler, .inputs = inputs});
+    for (const std::size_t batch : kBatches)
+      if (batch != kBatch) list.add({.sampler = sampler, .batch = batch});
+  for (const Inputs inputs : {Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
+    for (const Sampler sampler : kReflectionSamplers) list.add({.sampler = sampler, .inputs = inputs});
   constexpr Sampler kNormals[] = {Sampler::cap};
   for (const Case& which : operations(kReflectionSamplers, kNormals)) list.add(which);
-  for (const std::size_t batch : kBatches)
-    for (const Sampler sampler : kReflectionSamplers)
-      if (batch != kBatch) list.add({.sampler = sampler, .batch = batch});
   return list.take();
 }
 

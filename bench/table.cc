@@ -84,19 +84,31 @@ void add_limits(const BenchLimits& limits, Out out) {
   for (const FmaLimit& fma : limits.fma)
     fmt::format_to(out, "  fused multiply-adds, {}, {} thread{}: {:.0f} GFLOP/s\n", name(fma.target), fma.threads,
                    fma.threads == 1 ? "" : "s", fma.flops_per_second / 1e9);
-  for (const CopyLimit& copy : limits.copy)
-    fmt::format_to(out, "  copying {} columns in, {} out, batch {:>5}, {} thread{}: {:.3f} ns a lane, {:.1f} GB/s\n",
-                   copy.inputs, copy.outputs, batch_text(copy.batch), copy.threads, copy.threads == 1 ? "" : "s",
-                   copy.ns_per_sample, copy.bytes_per_second() / 1e9);
+  if (limits.copy.empty()) return;
+  fmt::format_to(out, "  copying the columns    in  out  batch\n");
+  for (std::size_t first = 0; first < limits.copy.size();) {
+    const CopyLimit& copy = limits.copy[first];
+    fmt::format_to(out, "{:27}{:5}{:>7}", copy.inputs, copy.outputs, batch_text(copy.batch));
+    // One thread and all of them side by side.
+    const auto same = [&](const CopyLimit& other) {
+      return other.inputs == copy.inputs && other.outputs == copy.outputs && other.batch == copy.batch;
+    };
+    for (; first < limits.copy.size() && same(limits.copy[first]); ++first)
+      fmt::format_to(out, "   {} thread{:2}{:7.3f} ns a lane{:7.1f} GB/s", limits.copy[first].threads,
+                     limits.copy[first].threads == 1 ? "" : "s", limits.copy[first].ns_per_sample,
+                     limits.copy[first].bytes_per_second() / 1e9);
+    fmt::format_to(out, "\n");
+  }
 }
 
 void add_targets(const std::vector<TargetResult>& targets, Out out) {
-  fmt::format_to(out, "\nPerformance to reach\n  {:54}{:>10}{:>10}  {:13}{}\n", "", "wanted", "measured", "", "");
+  fmt::format_to(out, "\nPerformance to reach (ratios: medians of interleaved pairs)\n  {:54}{:>10}{:>10}\n", "", "wanted", "measured");
   for (const TargetResult& t : targets) {
     const auto met = t.met();
-    fmt::format_to(out, "  {:54}{:>10}{:>10}  {:13}{}\n", t.what, fmt::format("{} {:g}", t.at_least ? ">=" : "<=", t.required),
-                   t.measured ? fmt::format("{:.2f}", *t.measured) : "-", met ? (*met ? "met" : "NOT MET") : "not measured",
-                   t.note);
+    fmt::format_to(out, "  {:54}{:>10}{:>10}  {}\n", t.what, fmt::format("{} {:g}", t.at_least ? ">=" : "<=", t.required),
+                   t.measured ? fmt::format("{:.2f}", *t.measured) : "-",
+                   met ? (*met ? "met" : "NOT MET") : "not measured");
+    if (!t.note.empty()) fmt::format_to(out, "      {}\n", t.note);
   }
 }
 
@@ -104,12 +116,12 @@ std::string alpha_text(const RejectionResult& r) { return fmt::format("{:g}, {:g
 
 // One configuration's results of all samplers stand next to each other.
 void add_configurations(const std::vector<const RejectionResult*>& results, std::size_t samplers, Out out) {
-  fmt::format_to(out, "  {:>7}{:>12}{:>10}", "theta", "alpha", "samples");
+  fmt::format_to(out, "  {:>7}{:>14}{:>10}", "theta", "alpha", "samples");
   for (std::size_t k = 0; k < samplers; ++k) fmt::format_to(out, "{:>18}", results[k]->sampler);
   fmt::format_to(out, "\n");
   for (std::size_t first = 0; first + samplers <= results.size(); first += samplers) {
     const RejectionResult& r = *results[first];
-    fmt::format_to(out, "  {:>6.4g}°{:>12}{:>10}", r.theta_degrees, alpha_text(r), r.samples);
+    fmt::format_to(out, "  {:>6.4g}°{:>14}{:>10}", r.theta_degrees, alpha_text(r), r.samples);
     for (std::size_t k = first; k < first + samplers; ++k) {
       const RejectionResult& s = *results[k];
       // Shares of many samples, counts of few.
@@ -122,6 +134,25 @@ void add_configurations(const std::vector<const RejectionResult*>& results, std:
   }
 }
 
+// Counted shares of one sampler: roughness down, angle across.
+void add_grid(const std::vector<const RejectionResult*>& results, std::string_view sampler, Out out) {
+  std::vector<double> thetas;
+  for (const RejectionResult* r : results)
+    if (r->sampler == sampler && std::find(thetas.begin(), thetas.end(), r->theta_degrees) == thetas.end())
+      thetas.push_back(r->theta_degrees);
+  fmt::format_to(out, "  {:14}", sampler);
+  for (const double theta : thetas) fmt::format_to(out, "{:>8.4g}°", theta);
+  const RejectionResult* last = nullptr;
+  for (const RejectionResult* r : results) {
+    if (r->sampler != sampler) continue;
+    if (last == nullptr || last->alpha_x != r->alpha_x || last->alpha_y != r->alpha_y)
+      fmt::format_to(out, "\n  {:>14}", alpha_text(*r));
+    fmt::format_to(out, "{:>9.4f}", r->share());
+    last = r;
+  }
+  fmt::format_to(out, "\n");
+}
+
 void add_rejections(const std::vector<RejectionResult>& rejections, Out out) {
   const auto of = [&](std::string_view experiment) {
     std::vector<const RejectionResult*> results;
@@ -132,8 +163,8 @@ void add_rejections(const std::vector<RejectionResult>& rejections, Out out) {
   const std::size_t samplers = all_samplers().size();
   fmt::format_to(out, "\nShare of samples occluded: counted [predicted]\n");
   add_configurations(of("table"), samplers, out);
-  fmt::format_to(out, "\nThe same, over angle and roughness\n");
-  add_configurations(of("sweep"), samplers, out);
+  fmt::format_to(out, "\nThe same over angle and roughness, counted (heitz is as cap, exact has none)\n");
+  for (const Sampler sampler : {Sampler::ndf, Sampler::cap, Sampler::bounded}) add_grid(of("sweep"), name(sampler), out);
   double largest = 0;
   std::uint64_t exact_samples = 0, exact_rejected = 0;
   for (const RejectionResult& r : rejections) {

@@ -15,7 +15,7 @@ namespace facetwise::bench {
 namespace {
 
 constexpr std::size_t kBatch = 65536;
-constexpr int kRounds = 15;
+constexpr int kRounds = 25;
 constexpr double kRound = 0.004;  // seconds that each side of a pair runs per round
 
 struct Roughness {

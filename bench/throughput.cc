@@ -134,8 +134,9 @@ void compare_with_limits(const Case& which, const BenchLimits& limits, BenchResu
 
 absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
   constexpr absl::string_view kTaken[] = {"benchmark_repetitions", "benchmark_min_time",
-                                          "benchmark_enable_random_interleaving", "benchmark_perf_counters", "v"};
-  std::vector<std::string> storage = {"facetwise", "--benchmark_enable_random_interleaving=true"};
+                                          "benchmark_enable_random_interleaving", "v"};
+  // Flags are the process's: what an earlier run may have set is set back.
+  std::vector<std::string> storage = {"facetwise", "--benchmark_enable_random_interleaving=true", "--v=0"};
   for (const std::string& flag : flags) {
     const bool taken = std::any_of(std::begin(kTaken), std::end(kTaken), [&](absl::string_view name) {
       return absl::StartsWith(flag, absl::StrCat("--", name, "="));
@@ -144,7 +145,7 @@ absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
       return absl::InvalidArgumentError(absl::StrCat(
           "benchmark flag \"", flag, "\": of Google Benchmark's flags, those that change how a measurement runs ",
           "are taken: --benchmark_repetitions=N, --benchmark_min_time=SECONDS, ",
-          "--benchmark_enable_random_interleaving=BOOL, --benchmark_perf_counters=NAMES, --v=LEVEL"));
+          "--benchmark_enable_random_interleaving=BOOL, --v=LEVEL"));
     storage.push_back(flag);
   }
   std::vector<char*> argv;
@@ -152,6 +153,8 @@ absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
   int argc = static_cast<int>(argv.size());
   argv.push_back(nullptr);
   benchmark::Initialize(&argc, argv.data());
+  // It leaves what it cannot parse.
+  if (argc > 1) return absl::InvalidArgumentError(absl::StrCat("benchmark flag \"", argv[1], "\": not a value that fits"));
   return absl::OkStatus();
 }
 

@@ -40,7 +40,7 @@ struct BenchOptions {
   bool rejections = true;  // the rejection-count experiment
   bool targets = true;     // the performance to reach
   // Google Benchmark's own flags, of those that change how a measurement runs: --benchmark_repetitions,
-  // --benchmark_min_time, --benchmark_enable_random_interleaving, --benchmark_perf_counters, --v.
+  // --benchmark_min_time, --benchmark_enable_random_interleaving, --v.
   std::vector<std::string> benchmark_flags;
 };
 
