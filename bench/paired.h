@@ -20,31 +20,30 @@ inline double median_of(std::vector<double> values) {
 }
 
 // Seconds of one call, over `calls` calls.
-template <class Call>
+template <class Clock = std::chrono::steady_clock, class Call>
 double time_calls(const Call& call, int calls) {
-  using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   for (int k = 0; k < calls; ++k) call();
   return std::chrono::duration<double>(Clock::now() - start).count() / calls;
 }
 
 // Calls that take `seconds`, at least one.
-template <class Call>
+template <class Clock = std::chrono::steady_clock, class Call>
 int calls_for(const Call& call, double seconds) {
   call();
-  const double once = std::max(time_calls(call, 1), 1e-9);
+  const double once = std::max(time_calls<Clock>(call, 1), 1e-9);
   const int trial = static_cast<int>(std::clamp(seconds / once / 4, 1.0, 1e6));
-  return static_cast<int>(std::clamp(seconds / time_calls(call, trial), 1.0, 1e6));
+  return static_cast<int>(std::clamp(seconds / time_calls<Clock>(call, trial), 1.0, 1e6));
 }
 
 // Each side runs `seconds` a round, but at least once. `rounds` is odd.
-template <class A, class B>
+template <class Clock = std::chrono::steady_clock, class A, class B>
 Paired measure_paired(const A& a, const B& b, int rounds, double seconds) {
-  const int calls_a = calls_for(a, seconds), calls_b = calls_for(b, seconds);
+  const int calls_a = calls_for<Clock>(a, seconds), calls_b = calls_for<Clock>(b, seconds);
   std::vector<double> times_a, times_b, ratios;
   for (int round = 0; round < rounds; ++round) {
-    times_a.push_back(time_calls(a, calls_a));
-    times_b.push_back(time_calls(b, calls_b));
+    times_a.push_back(time_calls<Clock>(a, calls_a));
+    times_b.push_back(time_calls<Clock>(b, calls_b));
     ratios.push_back(times_a.back() / times_b.back());
   }
   return {median_of(times_a), median_of(times_b), median_of(ratios)};

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <vector>
 
@@ -24,8 +26,11 @@ TEST(MultiplyAdd, CountsWhatItDoes) {
 
 TEST(Fma, WiderTargetsReachMore) {
   const auto targets = available_targets();
-  const double best = measure_fma(targets.front(), 1).flops_per_second;
-  const double portable = measure_fma(Target::scalar, 1).flops_per_second;
+  double best = 0, portable = 0;
+  for (int k = 0; k < 5; ++k) {  // on a busy machine a measurement may be of another program's making
+    best = std::max(best, measure_fma(targets.front(), 1).flops_per_second);
+    portable = std::max(portable, measure_fma(Target::scalar, 1).flops_per_second);
+  }
   EXPECT_GT(portable, 1e8);
   EXPECT_LT(best, 1e13);
   if (vector_lanes(targets.front()) >= 8) {
@@ -88,17 +93,30 @@ TEST(Columns, MoreThanTheMemoryIsAnError) {
   EXPECT_EQ(Columns::make(std::size_t{1} << 40).status().code(), absl::StatusCode::kResourceExhausted);
 }
 
-TEST(Paired, RatioOfKnownTimes) {
-  const auto wait = [](std::chrono::microseconds time) {
-    const auto end = std::chrono::steady_clock::now() + time;
-    while (std::chrono::steady_clock::now() < end) {
-    }
-  };
+// A clock that goes by what is called, and stands still otherwise.
+struct CallClock {
+  using duration = std::chrono::nanoseconds;
+  using time_point = std::chrono::time_point<CallClock, duration>;
+  static inline duration passed{};
+  static time_point now() { return time_point(passed); }
+};
+
+TEST(Paired, RatioIsThatOfUndisturbedRounds) {
   using std::chrono::microseconds;
-  const Paired pair = measure_paired([&] { wait(microseconds(300)); }, [&] { wait(microseconds(100)); }, 15, 0.003);
-  EXPECT_GE(pair.a, 300e-6);
-  EXPECT_GE(pair.b, 100e-6);
-  EXPECT_NEAR(pair.ratio, 3, 0.6);
+  int calls_a = 0, calls_b = 0;
+  // Every 100 calls, A is held up for as long as all of them take.
+  const auto a = [&] { CallClock::passed += microseconds(++calls_a % 100 == 0 ? 30000 : 300); };
+  const auto b = [&] {
+    ++calls_b;
+    CallClock::passed += microseconds(100);
+  };
+  const Paired pair = measure_paired<CallClock>(a, b, 15, 0.003);
+  EXPECT_NEAR(pair.ratio, 3, 1e-9);
+  EXPECT_NEAR(pair.a, 300e-6, 1e-12);
+  EXPECT_NEAR(pair.b, 100e-6, 1e-12);
+  // Both sides ran about 3 ms a round.
+  EXPECT_NEAR(calls_a, 15 * 10, 30);
+  EXPECT_NEAR(calls_b, 15 * 30, 90);
 }
 
 }  // namespace
