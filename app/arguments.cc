@@ -12,8 +12,8 @@
 namespace facetwise::app {
 
 void add_model(CLI::App& app, Model& model) {
-  add_named(app, "--distribution", model.distribution, parse_distribution, "Distribution of normals; default ggx",
-            "ggx");
+  add_named(app, "--distribution", model.distribution, parse_distribution,
+            "Distribution of normals; default ggx", "ggx");
   add_named(app, "--masking", model.masking, parse_masking, "Masking function; default smith", "smith");
   add_named(app, "--shadowing", model.shadowing, parse_shadowing,
             "Masking-shadowing of weights and values; default correlated", "correlated|uncorrelated");
@@ -29,13 +29,15 @@ void EngineArguments::add_remote(CLI::App& app) {
 }
 
 void EngineArguments::add_target(CLI::App& app) {
-  add_named(app, "--target", target, parse_target, "Instruction set of the local kernels; the bits are the same on each",
+  add_named(app, "--target", target, parse_target,
+            "Instruction set of the local kernels; the bits are the same on each",
             "best|scalar|avx2|avx3|neon");
 }
 
 absl::StatusOr<std::unique_ptr<Engine>> EngineArguments::open() const {
   if (!remote.empty()) {
-    if (target != Target::best) return invalid("--target: a server chooses its own; leave out --target or --remote");
+    if (target != Target::best)
+      return invalid("--target: a server chooses its own; leave out --target or --remote");
     return connect(remote);
   }
   if (!resolve(target)) return invalid("--target: this CPU or build has no {}", name(target));

@@ -17,13 +17,13 @@ struct FileColumn {
 };
 
 constexpr FileColumn kInputColumns[] = {
-    {"ix", "incident.x"}, {"iy", "incident.y"},    {"iz", "incident.z"},    {"alpha_x", "alpha_x"},
+    {"ix", "incident.x"},   {"iy", "incident.y"}, {"iz", "incident.z"}, {"alpha_x", "alpha_x"},
     {"alpha_y", "alpha_y"}, {"ox", "outgoing.x"}, {"oy", "outgoing.y"}, {"oz", "outgoing.z"},
-    {"u1", "u1"},         {"u2", "u2"},            {"u3", "u3"}};
+    {"u1", "u1"},           {"u2", "u2"},         {"u3", "u3"}};
 constexpr FileColumn kOutputColumns[] = {
-    {"ox", "out.outgoing.x"}, {"oy", "out.outgoing.y"}, {"oz", "out.outgoing.z"}, {"mx", "out.normal.x"},
-    {"my", "out.normal.y"},   {"mz", "out.normal.z"},   {"pdf", "out.pdf"},       {"weight", "out.weight"},
-    {"value", "out.value"}};
+    {"ox", "out.outgoing.x"}, {"oy", "out.outgoing.y"}, {"oz", "out.outgoing.z"},
+    {"mx", "out.normal.x"},   {"my", "out.normal.y"},   {"mz", "out.normal.z"},
+    {"pdf", "out.pdf"},       {"weight", "out.weight"}, {"value", "out.value"}};
 
 template <class Fields>
 const auto& field_named(const Fields& fields, std::string_view name) {
@@ -39,12 +39,14 @@ bool known_column(std::string_view name) {
 // Turns a table's columns into a batch's inputs.
 class Inputs {
  public:
-  Inputs(const FileCall& call, InputTable& table) : call_(call), table_(table), used_(table.names().size(), false) {}
+  Inputs(const FileCall& call, InputTable& table)
+      : call_(call), table_(table), used_(table.names().size(), false) {}
 
   absl::Status fill(Batch& batch) {
     for (const std::string& name : table_.names())
       if (!known_column(name))
-        return invalid("{}: unknown column {}; known are ix iy iz alpha_x alpha_y u1 u2 u3 ox oy oz", shown(), name);
+        return invalid("{}: unknown column {}; known are ix iy iz alpha_x alpha_y u1 u2 u3 ox oy oz", shown(),
+                       name);
     for (const FileColumn& column : kInputColumns) {
       const InputField& field = field_named(input_fields(), column.field);
       if (!(field.operations & bit(call_.operation))) continue;
@@ -85,9 +87,9 @@ class Inputs {
   absl::Status take(std::string_view name, bool random, Column<float>& column) {
     const int index = find(name);
     if (index < 0) {
-      const std::string_view instead = random                        ? " (or give --seed instead of columns u1 u2 u3)"
+      const std::string_view instead = random ? " (or give --seed instead of columns u1 u2 u3)"
                                        : name.starts_with("alpha") ? " (or give --alpha)"
-                                                                     : "";
+                                                                   : "";
       return invalid("{}: no column {}{}", shown(), name, instead);
     }
     auto values = table_.column(static_cast<std::size_t>(index));
@@ -115,7 +117,8 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
 
   std::vector<std::string> names;
   for (const FileColumn& column : kOutputColumns)
-    if (field_named(output_fields(), column.field).operations & bit(call.operation)) names.emplace_back(column.name);
+    if (field_named(output_fields(), column.field).operations & bit(call.operation))
+      names.emplace_back(column.name);
   auto output = create_table(call.output, names, batch.lanes);
   if (!output.ok()) return output.status();
   std::size_t index = 0;

@@ -22,7 +22,8 @@ CSV: a header line with the columns' names, then one line per lane.
 constexpr const char* kRandomColumns =
     "  u1 u2 u3         uniform numbers in [0, 1); u3 for the sampler exact alone (or --seed)\n";
 constexpr const char* kQueryColumns = "  ox oy oz         outgoing direction\n";
-constexpr const char* kStatus = R"(  status           0 accepted, 1 occluded, 2 smooth (alpha below 1e-4), 3 invalid (NaN, not a unit
+constexpr const char* kStatus =
+    R"(  status           0 accepted, 1 occluded, 2 smooth (alpha below 1e-4), 3 invalid (NaN, not a unit
                    vector, ...); such lanes are no error and are counted on standard error
 )";
 
@@ -51,9 +52,11 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
     fmt::print(stderr, "{}\n", json.dump());
     return;
   }
-  fmt::print(stderr, "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
-             verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(call.sampler),
-             verb_arguments.engine.shown(), 1e3 * result.seconds);
+  fmt::print(
+      stderr,
+      "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
+      verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(call.sampler),
+      verb_arguments.engine.shown(), 1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
 }
@@ -66,12 +69,13 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   CLI::App& command = *app.add_subcommand(verb, about);
   command.footer(columns);
   command.add_option("-i,--input", call.input, "File with one lane per row; default -")->type_name("FILE");
-  command.add_option("-o,--output", call.output,
-                     "File to write; default -. It appears when it is complete")->type_name("FILE");
+  command.add_option("-o,--output", call.output, "File to write; default -. It appears when it is complete")
+      ->type_name("FILE");
   add_model(command, call.model);
   add_named(command, "--sampler", arguments->sampler, parse_sampler,
-            operation == Operation::sample_reflection ? "How directions are drawn; default exact (cap with --normals)"
-                                                      : "The sampler whose pdf is meant; default exact",
+            operation == Operation::sample_reflection
+                ? "How directions are drawn; default exact (cap with --normals)"
+                : "The sampler whose pdf is meant; default exact",
             kSamplerNames);
   command.add_option("--alpha", call.alpha, "Roughness of all lanes: alpha_x and, if it differs, alpha_y")
       ->expected(1, 2)

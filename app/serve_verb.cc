@@ -38,8 +38,11 @@ struct ServeVerb {
 };
 
 std::string check_mode(const std::string& text) {
-  const bool octal = !text.empty() && text.size() <= 4 && text.find_first_not_of("01234567") == std::string::npos;
-  return octal && std::stoul(text, nullptr, 8) <= 0777 ? "" : fmt::format("\"{}\" is not a mode such as 0660", text);
+  const bool octal =
+      !text.empty() && text.size() <= 4 && text.find_first_not_of("01234567") == std::string::npos;
+  return octal && std::stoul(text, nullptr, 8) <= 0777
+             ? ""
+             : fmt::format("\"{}\" is not a mode such as 0660", text);
 }
 
 }  // namespace
@@ -48,34 +51,50 @@ Verb add_serve(CLI::App& app) {
   auto arguments = std::make_shared<ServeVerb>();
   ServerOptions& options = arguments->options;
   CLI::App& command = *app.add_subcommand("serve", "Answer the library's calls over gRPC until SIGTERM");
-  command.footer(R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol is
-proto/facetwise/v1/sampler.proto; health checks and reflection are on. There is no authentication: listen
-on a Unix socket, on 127.0.0.1, or on a network whose every user may call.
+  command.footer(
+      R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol
+is proto/facetwise/v1/sampler.proto; health checks and reflection are on. There is no authentication:
+listen on a Unix socket, on 127.0.0.1, or on a network whose every user may call.
 
 Examples:
   facetwise serve --listen unix:/tmp/facetwise.sock
   facetwise serve --listen 127.0.0.1:7777 --listen unix:/run/facetwise.sock --unix-mode 0660 --threads 8)");
-  command.add_option("--listen", options.listen, "Where to listen; may be repeated. Port 0 takes a free one, which is printed")
+  command
+      .add_option("--listen", options.listen,
+                  "Where to listen; may be repeated. Port 0 takes a free one, which is printed")
       ->required()
       ->allow_extra_args(false)
       ->option_text("unix:PATH|HOST:PORT (required)");
-  command.add_option("--threads", options.threads, "Threads that compute; default as many as there are cores")
-      ->check(CLI::Range(1, 4096))->option_text("N");
-  command.add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
-      ->check(CLI::Range(1, 2047))->option_text("N");
-  command.add_option("--max-mib-in-flight", arguments->max_mib_in_flight,
-                     "Requests and responses held at once; beyond, calls get RESOURCE_EXHAUSTED; default 1024")
-      ->check(CLI::Range(1, 1 << 24))->option_text("N");
-  command.add_option("--max-calls", options.max_calls,
-                     "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
-      ->check(CLI::Range(1, 1 << 20))->option_text("N");
+  command
+      .add_option("--threads", options.threads, "Threads that compute; default as many as there are cores")
+      ->check(CLI::Range(1, 4096))
+      ->option_text("N");
+  command
+      .add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
+      ->check(CLI::Range(1, 2047))
+      ->option_text("N");
+  command
+      .add_option("--max-mib-in-flight", arguments->max_mib_in_flight,
+                  "Requests and responses held at once; beyond, calls get RESOURCE_EXHAUSTED; default 1024")
+      ->check(CLI::Range(1, 1 << 24))
+      ->option_text("N");
+  command
+      .add_option("--max-calls", options.max_calls,
+                  "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
+      ->check(CLI::Range(1, 1 << 20))
+      ->option_text("N");
   command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
-      ->check(check_mode)->option_text("MODE");
-  command.add_option("--drain-seconds", arguments->drain_seconds, "Longest wait for calls in flight at the end; default 10")
-      ->check(CLI::Range(0, 86400))->option_text("N");
-  command.add_flag("--allow-benchmark", options.allow_benchmark, "Let clients run benchmarks on this machine");
-  add_named(command, "--target", options.execution.target, parse_target, "Instruction set of the kernels; default best",
-            "best|scalar|avx2|avx3|neon");
+      ->check(check_mode)
+      ->option_text("MODE");
+  command
+      .add_option("--drain-seconds", arguments->drain_seconds,
+                  "Longest wait for calls in flight at the end; default 10")
+      ->check(CLI::Range(0, 86400))
+      ->option_text("N");
+  command.add_flag("--allow-benchmark", options.allow_benchmark,
+                   "Let clients run benchmarks on this machine");
+  add_named(command, "--target", options.execution.target, parse_target,
+            "Instruction set of the kernels; default best", "best|scalar|avx2|avx3|neon");
   return {&command, [arguments] { return arguments->run(); }};
 }
 

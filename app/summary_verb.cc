@@ -35,7 +35,9 @@ absl::StatusOr<Json> read_json(const std::string& path) {
 // The rates of one operation, sampler and roughness; each implementation at its best batch size.
 struct Row {
   std::array<double, kCount> rate{};  // samples per second, 0 if not measured
-  int measured() const { return static_cast<int>(std::count_if(rate.begin(), rate.end(), [](double r) { return r > 0; })); }
+  int measured() const {
+    return static_cast<int>(std::count_if(rate.begin(), rate.end(), [](double r) { return r > 0; }));
+  }
 };
 
 std::string millions(double rate) { return rate > 0 ? fmt::format("{:.1f}", 1e-6 * rate) : "-"; }
@@ -47,7 +49,8 @@ struct Table {
 
   explicit Table(const Json& report) {
     for (const Json& result : report.at("results")) {
-      const auto found = std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
+      const auto found =
+          std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
       if (found == kImplementations.end() || result.value("inputs", "columns") != "columns") continue;
       const Json& alpha = result.at("alpha");
       Row& row = rows[{result.at("operation"), result.at("sampler")}][{alpha.at(0), alpha.at(1)}];
@@ -58,19 +61,20 @@ struct Table {
 
   void print() const {
     fmt::print("\nThroughput, million samples a second, each at its best batch size\n");
-    fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", "operation", "sampler", "alpha",
-               "scalar", "one lane", "SIMD", "threads", "remote", "SIMD/scalar", "threads/SIMD", "remote/SIMD");
+    fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", "operation",
+               "sampler", "alpha", "scalar", "one lane", "SIMD", "threads", "remote", "SIMD/scalar",
+               "threads/SIMD", "remote/SIMD");
     for (const auto& [what, by_alpha] : rows) {
       // The roughness that most implementations were measured at.
       const auto best = std::max_element(by_alpha.begin(), by_alpha.end(), [](const auto& a, const auto& b) {
         return a.second.measured() < b.second.measured();
       });
       const auto& [alpha, row] = *best;
-      fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", what.first, what.second,
-                 fmt::format("{}, {}", alpha.first, alpha.second), millions(row.rate[kScalar]), millions(row.rate[kOneLane]),
-                 millions(row.rate[kSimd]), millions(row.rate[kThreads]), millions(row.rate[kRemote]),
-                 ratio(row.rate[kSimd], row.rate[kScalar]), ratio(row.rate[kThreads], row.rate[kSimd]),
-                 ratio(row.rate[kRemote], row.rate[kSimd]));
+      fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", what.first,
+                 what.second, fmt::format("{}, {}", alpha.first, alpha.second), millions(row.rate[kScalar]),
+                 millions(row.rate[kOneLane]), millions(row.rate[kSimd]), millions(row.rate[kThreads]),
+                 millions(row.rate[kRemote]), ratio(row.rate[kSimd], row.rate[kScalar]),
+                 ratio(row.rate[kThreads], row.rate[kSimd]), ratio(row.rate[kRemote], row.rate[kSimd]));
     }
   }
 };
@@ -82,15 +86,17 @@ void print_verification(const Json& verification) {
   };
   fmt::print("\nReal input\n");
   fmt::print("  mesh {}: {} triangles\n", verification.at("mesh").get<std::string>(), count("triangles"));
-  fmt::print("  {} rays, {:.1f} % hit; {} lanes, {:.1f} % backfacing\n", count("rays"), percent(count("hits"), count("rays")),
-             count("lanes"), percent(count("backfacing"), count("lanes")));
+  fmt::print("  {} rays, {:.1f} % hit; {} lanes, {:.1f} % backfacing\n", count("rays"),
+             percent(count("hits"), count("rays")), count("lanes"),
+             percent(count("backfacing"), count("lanes")));
   fmt::print("  server against this process: {} bytes, {}\n", count("bytes_compared"),
              verification.at("equal").get<bool>() ? "every one equal" : "DIFFERENT");
   fmt::print("\nReflections occluded on it, by sampler\n");
   for (const Json& sampler : verification.at("reflections")) {
-    const auto occluded = sampler.at("occluded").get<std::uint64_t>(), samples = sampler.at("samples").get<std::uint64_t>();
-    fmt::print("  {:<8} {:>9} of {} ({:.2f} %)\n", sampler.at("sampler").get<std::string>(), occluded, samples,
-               percent(occluded, samples));
+    const auto occluded = sampler.at("occluded").get<std::uint64_t>(),
+               samples = sampler.at("samples").get<std::uint64_t>();
+    fmt::print("  {:<8} {:>9} of {} ({:.2f} %)\n", sampler.at("sampler").get<std::string>(), occluded,
+               samples, percent(occluded, samples));
   }
 }
 
@@ -102,11 +108,13 @@ int run(const std::string& report_path, const std::string& verification_path) {
   try {
     const Json& machine = report->at("machine");
     fmt::print("facetwise {} on {}, {} cores, {}\n", report->at("version").get<std::string>(),
-               machine.at("cpu").get<std::string>(), machine.at("cores").get<int>(), machine.at("target").get<std::string>());
+               machine.at("cpu").get<std::string>(), machine.at("cores").get<int>(),
+               machine.at("target").get<std::string>());
     print_verification(*verification);
     Table(*report).print();
   } catch (const Json::exception& error) {
-    return fail("summary", invalid("{}, {}: not what bench and verify write: {}", report_path, verification_path, error.what()));
+    return fail("summary", invalid("{}, {}: not what bench and verify write: {}", report_path,
+                                   verification_path, error.what()));
   }
   return kDone;
 }
@@ -118,10 +126,15 @@ Verb add_summary(CLI::App& app) {
     std::string report, verification;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command = *app.add_subcommand("summary", "Print a summary of what bench and verify wrote as JSON");
+  CLI::App& command =
+      *app.add_subcommand("summary", "Print a summary of what bench and verify wrote as JSON");
   command.footer("Example:\n  facetwise summary --report out/report.json --verification out/verify.json");
-  command.add_option("--report", arguments->report, "What `bench --json` wrote")->required()->type_name("FILE");
-  command.add_option("--verification", arguments->verification, "What `verify --json` wrote")->required()->type_name("FILE");
+  command.add_option("--report", arguments->report, "What `bench --json` wrote")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("--verification", arguments->verification, "What `verify --json` wrote")
+      ->required()
+      ->type_name("FILE");
   return {&command, [arguments] { return run(arguments->report, arguments->verification); }};
 }
 

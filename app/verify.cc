@@ -15,7 +15,8 @@ namespace {
 
 // All outputs of an operation.
 struct Answer {
-  std::vector<std::vector<float>> columns;  // as output_fields(); empty where the operation has no such output
+  std::vector<std::vector<float>>
+      columns;  // as output_fields(); empty where the operation has no such output
   std::vector<std::uint8_t> status;
   Statistics statistics;
   double seconds = 0;
@@ -42,7 +43,8 @@ absl::StatusOr<Answer> ask(Engine& engine, Operation operation, Batch batch, std
 
 // Says where two columns differ; nothing where they do not.
 template <class T>
-std::string column_difference(std::string_view name, const std::vector<T>& remote, const std::vector<T>& local) {
+std::string column_difference(std::string_view name, const std::vector<T>& remote,
+                              const std::vector<T>& local) {
   if (remote.empty() || std::memcmp(remote.data(), local.data(), remote.size() * sizeof(T)) == 0) return {};
   std::size_t count = 0, first = 0;
   for (std::size_t lane = remote.size(); lane-- > 0;)
@@ -53,7 +55,8 @@ std::string column_difference(std::string_view name, const std::vector<T>& remot
 
 std::string difference(const Answer& remote, const Answer& local) {
   for (std::size_t k = 0; k < local.columns.size(); ++k)
-    if (auto text = column_difference(output_fields()[k].name, remote.columns[k], local.columns[k]); !text.empty())
+    if (auto text = column_difference(output_fields()[k].name, remote.columns[k], local.columns[k]);
+        !text.empty())
       return text;
   if (auto text = column_difference("out.status", remote.status, local.status); !text.empty()) return text;
   if (remote.statistics != local.statistics) return "the statistics differ";
@@ -125,7 +128,8 @@ std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
   std::vector<VerifyCase> cases;
   for (const bool generator : {true, false})
     for (const Sampler sampler : samplers)
-      cases.push_back({.operation = Operation::sample_reflection, .sampler = sampler, .generator = generator});
+      cases.push_back(
+          {.operation = Operation::sample_reflection, .sampler = sampler, .generator = generator});
   for (const Sampler sampler : samplers)
     if (samples_normals(sampler) && sampler != Sampler::ndf)
       cases.push_back({.operation = Operation::sample_normal, .sampler = sampler});
@@ -139,7 +143,8 @@ std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
 }
 
 bool Verification::equal() const {
-  return std::all_of(batches.begin(), batches.end(), [](const auto& batch) { return batch.difference.empty(); });
+  return std::all_of(batches.begin(), batches.end(),
+                     [](const auto& batch) { return batch.difference.empty(); });
 }
 
 std::uint64_t Verification::lanes() const {
@@ -148,7 +153,8 @@ std::uint64_t Verification::lanes() const {
   return total;
 }
 
-absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera, const VerifyOptions& options,
+absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera,
+                                    const VerifyOptions& options,
                                     const std::function<void(const VerifiedBatch&)>& progress) {
   const auto cases = verify_cases(options.samplers);
   Verification verification;

@@ -29,9 +29,9 @@ struct VerifiedBatch {
   VerifyCase what;
   Statistics statistics;
   std::uint64_t backfacing = 0;
-  std::uint64_t bytes = 0;       // compared
+  std::uint64_t bytes = 0;  // compared
   double remote_seconds = 0, local_seconds = 0;
-  std::string difference;        // empty if every byte and the statistics are equal
+  std::string difference;  // empty if every byte and the statistics are equal
 };
 
 struct Verification {
@@ -51,7 +51,8 @@ struct VerifyOptions {
 
 // Traces the batches, has each answered by both engines and compares the answers. An error is a call that
 // failed; a difference is in the result. `progress` is called after each batch.
-absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera, const VerifyOptions& options,
+absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera,
+                                    const VerifyOptions& options,
                                     const std::function<void(const VerifiedBatch&)>& progress);
 
 }  // namespace facetwise::app

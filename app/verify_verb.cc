@@ -39,7 +39,8 @@ double millions(std::uint64_t lanes, double seconds) {
 
 std::string shown(const VerifyCase& what) {
   std::string text(name(what.operation));
-  const bool samples = what.operation == Operation::sample_reflection || what.operation == Operation::sample_normal;
+  const bool samples =
+      what.operation == Operation::sample_reflection || what.operation == Operation::sample_normal;
   if (what.operation != Operation::masking && what.operation != Operation::evaluate_reflection)
     text += fmt::format(" {}", name(what.sampler));
   if (what.shadowing != Shadowing::correlated) text += fmt::format(" {}", name(what.shadowing));
@@ -74,11 +75,11 @@ void print(const Verification& verification, const std::string& mesh) {
   fmt::print("mesh        {}: {} triangles\n", mesh, verification.triangles);
   fmt::print("rays        {}, of which {} hit ({:.1f} %)\n", verification.rays, verification.hits,
              percent(verification.hits, verification.rays));
-  fmt::print("lanes       {} in {} batches, {} backfacing ({:.1f} %)\n", totals.lanes, verification.batches.size(),
-             totals.backfacing, percent(totals.backfacing, totals.lanes));
+  fmt::print("lanes       {} in {} batches, {} backfacing ({:.1f} %)\n", totals.lanes,
+             verification.batches.size(), totals.backfacing, percent(totals.backfacing, totals.lanes));
   for (const auto& [sampler, count] : totals.reflections)
-    fmt::print("occluded    {:<8} {:>9} of {} reflections ({:.2f} %)\n", name(sampler), count.occluded, count.samples,
-               percent(count.occluded, count.samples));
+    fmt::print("occluded    {:<8} {:>9} of {} reflections ({:.2f} %)\n", name(sampler), count.occluded,
+               count.samples, percent(count.occluded, count.samples));
   fmt::print("throughput  remote {:.1f}, local {:.0f} million lanes/s, all outputs\n",
              millions(totals.lanes, totals.remote_seconds), millions(totals.lanes, totals.local_seconds));
   if (verification.equal())
@@ -104,7 +105,8 @@ Json to_json(const Verification& verification, const std::string& mesh, const En
                {"reflections", Json::array()},
                {"batches", Json::array()}};
   for (const auto& [sampler, count] : totals.reflections)
-    json["reflections"].push_back({{"sampler", name(sampler)}, {"samples", count.samples}, {"occluded", count.occluded}});
+    json["reflections"].push_back(
+        {{"sampler", name(sampler)}, {"samples", count.samples}, {"occluded", count.occluded}});
   for (const VerifiedBatch& batch : verification.batches)
     json["batches"].push_back({{"operation", name(batch.what.operation)},
                                {"sampler", name(batch.what.sampler)},
@@ -147,7 +149,8 @@ struct VerifyVerb {
       const Statistics& s = batch.statistics;
       fmt::print(stderr, "[{:>2}/{}] {:<38} {} lanes, {:5.2f} % occluded, remote {:5.1f} M/s: {}\n", ++done,
                  options.batches, shown(batch.what), s.lanes(), percent(s.occluded, s.lanes()),
-                 millions(s.lanes(), batch.remote_seconds), batch.difference.empty() ? "equal" : batch.difference);
+                 millions(s.lanes(), batch.remote_seconds),
+                 batch.difference.empty() ? "equal" : batch.difference);
     });
     if (!verification.ok()) return fail("verify", verification.status());
     print(*verification, mesh);
@@ -166,8 +169,10 @@ struct VerifyVerb {
 
 Verb add_verify(CLI::App& app) {
   auto arguments = std::make_shared<VerifyVerb>();
-  CLI::App& command = *app.add_subcommand("verify", "Compare every byte of servers' answers with this machine's");
-  command.footer(R"(Rays are traced from a fixed camera at a mesh; what they hit, with normals bent by a procedural
+  CLI::App& command =
+      *app.add_subcommand("verify", "Compare every byte of servers' answers with this machine's");
+  command.footer(
+      R"(Rays are traced from a fixed camera at a mesh; what they hit, with normals bent by a procedural
 normal map and roughness that varies over the mesh, is sent batch by batch, and every answer is
 recomputed here. The first batches sample reflections by each sampler, the others normals, densities,
 values and masking, in turn. Exit code 1 if a byte differs.
@@ -177,12 +182,16 @@ Examples:
   facetwise verify --remote host1:7777,host2:7777 --sampler exact --batches 4 --mesh bunny.ply)");
   arguments->engine.add_remote(command);
   command.get_option("--remote")->required()->option_text("ADDRESS[,ADDRESS...] (required)");
-  command.add_option("--mesh", arguments->mesh, "Any format that assimp reads; default 2CylinderEngine.glb of assimp-testmodels")
+  command
+      .add_option("--mesh", arguments->mesh,
+                  "Any format that assimp reads; default 2CylinderEngine.glb of assimp-testmodels")
       ->type_name("FILE");
   command.add_option("--batches", arguments->options.batches, "Batches to send; default 16")
-      ->check(CLI::PositiveNumber)->option_text("N");
+      ->check(CLI::PositiveNumber)
+      ->option_text("N");
   command.add_option("--lanes", arguments->options.lanes, "Lanes in a batch; default 1048576")
-      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 28))->option_text("N");
+      ->check(CLI::Range(std::size_t{1}, std::size_t{1} << 28))
+      ->option_text("N");
   arguments->options.samplers.assign(all_samplers().begin(), all_samplers().end());
   command
       .add_option_function<std::string>(
@@ -191,12 +200,14 @@ Examples:
             if (text == "all") return;
             const auto sampler = parse_sampler(text);
             if (!sampler)
-              throw CLI::ValidationError("--sampler", fmt::format("\"{}\" is not one of {}|all", text, kSamplerNames));
+              throw CLI::ValidationError("--sampler",
+                                         fmt::format("\"{}\" is not one of {}|all", text, kSamplerNames));
             arguments->options.samplers = {*sampler};
           },
           "Only this sampler; default all")
       ->type_name(std::string(kSamplerNames) + "|all");
-  command.add_option("--seed", arguments->options.seed, "Seed of the random numbers; default 1")->type_name("N");
+  command.add_option("--seed", arguments->options.seed, "Seed of the random numbers; default 1")
+      ->type_name("N");
   command.add_option("--json", arguments->json, "Write the result as JSON")->type_name("FILE");
   return {&command, [arguments] { return arguments->run(); }};
 }

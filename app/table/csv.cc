@@ -97,7 +97,8 @@ class CsvInput final : public InputTable {
         const std::string_view text = trim(line.substr(0, comma));
         const std::optional<float> value = parse_float(text);
         if (!value)
-          return invalid("{}, line {}, column {}: \"{}\" is not a number", path, number, names_[column], text);
+          return invalid("{}, line {}, column {}: \"{}\" is not a number", path, number, names_[column],
+                         text);
         columns_[column].push_back(*value);
       }
       line.remove_prefix(more ? comma + 1 : line.size());
@@ -114,7 +115,9 @@ class CsvInput final : public InputTable {
 class CsvOutput final : public OutputTable {
  public:
   CsvOutput(std::span<const std::string> names, std::size_t rows, std::optional<OutputFile> file)
-      : names_(names.begin(), names.end()), columns_(names.size(), std::vector<float>(rows)), status_(rows),
+      : names_(names.begin(), names.end()),
+        columns_(names.size(), std::vector<float>(rows)),
+        status_(rows),
         file_(std::move(file)) {}
 
   OutputColumn<float> column(std::size_t index) override { return OutputColumn<float>(columns_[index]); }
@@ -122,11 +125,14 @@ class CsvOutput final : public OutputTable {
 
   absl::Status commit() override {
     fmt::memory_buffer text;
-    const auto append = [&](std::string_view piece) { text.append(piece.data(), piece.data() + piece.size()); };
+    const auto append = [&](std::string_view piece) {
+      text.append(piece.data(), piece.data() + piece.size());
+    };
     for (const auto& name : names_) append(name), append(",");
     append("status\n");
     for (std::size_t row = 0; row < status_.size(); ++row) {
-      for (const auto& column : columns_) fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
+      for (const auto& column : columns_)
+        fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
       fmt::format_to(fmt::appender(text), FMT_COMPILE("{}\n"), status_[row]);
       if (text.size() < kPiece) continue;
       if (auto status = write({text.data(), text.size()}); !status.ok()) return status;
@@ -175,7 +181,8 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_csv(const std::string& path) {
   return parse_csv(path, std::move(text));
 }
 
-absl::StatusOr<std::unique_ptr<OutputTable>> create_csv(const std::string& path, std::span<const std::string> columns,
+absl::StatusOr<std::unique_ptr<OutputTable>> create_csv(const std::string& path,
+                                                        std::span<const std::string> columns,
                                                         std::size_t rows) {
   std::optional<OutputFile> file;
   if (path != "-") {

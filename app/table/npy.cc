@@ -66,12 +66,13 @@ class NpyInput final : public InputTable {
   absl::StatusOr<Column<float>> column(std::size_t index) override {
     const NpyField& field = header_.fields[index];
     if (!field.scalar || field.type != "<f4")
-      return invalid("{}: field {} is {}; it must be little-endian float32, '<f4' (numpy: array.astype)", path_,
-                     field.name, field.type);
+      return invalid("{}: field {} is {}; it must be little-endian float32, '<f4' (numpy: array.astype)",
+                     path_, field.name, field.type);
     const char* first = mapping_.data() + header_.data_offset + field.offset;
     const bool aligned = reinterpret_cast<std::uintptr_t>(first) % alignof(float) == 0 &&
                          header_.record_bytes % alignof(float) == 0;
-    if (aligned) return Column<float>(reinterpret_cast<const float*>(first), header_.rows, header_.record_bytes);
+    if (aligned)
+      return Column<float>(reinterpret_cast<const float*>(first), header_.rows, header_.record_bytes);
     // A packed record of odd length: columns need 4-byte alignment.
     auto& copy = copies_.emplace_back(header_.rows);
     for (std::size_t row = 0; row < header_.rows; ++row)
@@ -91,7 +92,10 @@ class NpyInput final : public InputTable {
 class NpyOutput final : public OutputTable {
  public:
   NpyOutput(OutputFile file, Mapping mapping, std::size_t data_offset, std::size_t columns, std::size_t rows)
-      : file_(std::move(file)), mapping_(std::move(mapping)), data_(mapping_.data() + data_offset), columns_(columns),
+      : file_(std::move(file)),
+        mapping_(std::move(mapping)),
+        data_(mapping_.data() + data_offset),
+        columns_(columns),
         rows_(rows) {}
 
   OutputColumn<float> column(std::size_t index) override {
@@ -137,7 +141,8 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_npy(const std::string& path) {
   return std::make_unique<NpyInput>(path, std::move(mapping), *std::move(header));
 }
 
-absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path, std::span<const std::string> columns,
+absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path,
+                                                        std::span<const std::string> columns,
                                                         std::size_t rows) {
   std::string header = "{'descr': [";
   for (const std::string& name : columns) header += fmt::format("('{}', '<f4'), ", name);
@@ -160,7 +165,8 @@ absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path,
     return invalid("{}: cannot reserve {} bytes: {}", path, size, std::strerror(error));
   Mapping mapping;
   if (!mapping.map(file->descriptor(), size, true)) return invalid("{}: {}", path, std::strerror(errno));
-  return std::make_unique<NpyOutput>(*std::move(file), std::move(mapping), header.size(), columns.size(), rows);
+  return std::make_unique<NpyOutput>(*std::move(file), std::move(mapping), header.size(), columns.size(),
+                                     rows);
 }
 
 }  // namespace facetwise::app

@@ -40,7 +40,8 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_table(const std::string& path);
 
 // Makes a table of `rows` rows with the named float columns and then `status`, to be written to PATH as
 // read_table() would read it.
-absl::StatusOr<std::unique_ptr<OutputTable>> create_table(const std::string& path, std::span<const std::string> columns,
+absl::StatusOr<std::unique_ptr<OutputTable>> create_table(const std::string& path,
+                                                          std::span<const std::string> columns,
                                                           std::size_t rows);
 
 }  // namespace facetwise::app

@@ -33,8 +33,9 @@ TEST(Bench, MeasuresHereAndRemotely) {
   const Directory directory;
   const Server server(directory);
   const std::string path = directory.path("report.json");
-  const auto result = facetwise({"bench", "--filter", "^sample_reflection/cap/0.3,0.3/4096/[a-z-]*$", "--min-seconds",
-                                 "0.01", "--no-limits", "--remote", server.address(), "--json", path});
+  const auto result =
+      facetwise({"bench", "--filter", "^sample_reflection/cap/0.3,0.3/4096/[a-z-]*$", "--min-seconds", "0.01",
+                 "--no-limits", "--remote", server.address(), "--json", path});
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_NE(result.out.find("sample_reflection"), std::string::npos) << result.out;
   const Json report = Json::parse(read_file(path));
@@ -42,7 +43,8 @@ TEST(Bench, MeasuresHereAndRemotely) {
   std::vector<std::string> implementations;
   for (const Json& row : report["results"]) implementations.push_back(row["implementation"]);
   std::sort(implementations.begin(), implementations.end());
-  EXPECT_EQ(implementations, (std::vector<std::string>{"one-lane", "remote", "scalar", "simd", "simd-threads"}));
+  EXPECT_EQ(implementations,
+            (std::vector<std::string>{"one-lane", "remote", "scalar", "simd", "simd-threads"}));
 }
 
 TEST(Bench, RunsOnAServersMachineIfAllowed) {
@@ -50,7 +52,8 @@ TEST(Bench, RunsOnAServersMachineIfAllowed) {
   const Server closed(directory, "closed.sock"), open(directory, "open.sock", {"--allow-benchmark"});
   const std::string path = directory.path("report.json");
   const auto run_at = [&](const Server& server, const std::string& filter) {
-    return facetwise({"bench", "--at", server.address(), "--filter", filter, "--min-seconds", "0.01", "--json", path});
+    return facetwise(
+        {"bench", "--at", server.address(), "--filter", filter, "--min-seconds", "0.01", "--json", path});
   };
   const std::string filter = "^masking/.*/0.3,0.3/256/simd$";
   const auto refused = run_at(closed, filter);
@@ -79,22 +82,33 @@ TEST(Bench, SaysWhatIsWrong) {
 }
 
 Json row(const std::string& implementation, double rate, const std::string& inputs = "columns") {
-  return {{"operation", "sample_reflection"}, {"sampler", "exact"}, {"alpha", {0.3, 0.3}}, {"inputs", inputs},
-          {"implementation", implementation}, {"batch", 65536}, {"samples_per_second", rate}};
+  return {{"operation", "sample_reflection"},
+          {"sampler", "exact"},
+          {"alpha", {0.3, 0.3}},
+          {"inputs", inputs},
+          {"implementation", implementation},
+          {"batch", 65536},
+          {"samples_per_second", rate}};
 }
 
 TEST(Summary, ShowsRatesRatiosAndCounts) {
   const Directory directory;
   Json report = {{"version", "1.2.3"}, {"machine", {{"cpu", "A CPU"}, {"cores", 2}, {"target", "avx2"}}}};
-  report["results"] = {row("scalar", 40e6), row("simd", 700e6), row("simd", 800e6), row("simd-threads", 1500e6),
-                       row("remote", 30e6), row("simd", 999e6, "generator")};
-  const Json verification = {{"mesh", "m.glb"}, {"triangles", 7}, {"rays", 200}, {"hits", 120}, {"lanes", 100},
-                             {"backfacing", 5}, {"bytes_compared", 3300}, {"equal", true},
+  report["results"] = {row("scalar", 40e6),         row("simd", 700e6),  row("simd", 800e6),
+                       row("simd-threads", 1500e6), row("remote", 30e6), row("simd", 999e6, "generator")};
+  const Json verification = {{"mesh", "m.glb"},
+                             {"triangles", 7},
+                             {"rays", 200},
+                             {"hits", 120},
+                             {"lanes", 100},
+                             {"backfacing", 5},
+                             {"bytes_compared", 3300},
+                             {"equal", true},
                              {"reflections", {{{"sampler", "cap"}, {"samples", 100}, {"occluded", 12}}}}};
   write_file(directory.path("r.json"), report.dump());
   write_file(directory.path("v.json"), verification.dump());
-  const std::vector<std::string> arguments = {"summary", "--report", directory.path("r.json"), "--verification",
-                                              directory.path("v.json")};
+  const std::vector<std::string> arguments = {"summary", "--report", directory.path("r.json"),
+                                              "--verification", directory.path("v.json")};
   const auto result = facetwise(arguments);
   ASSERT_EQ(result.code, 0) << result.err;
   for (const char* text : {"facetwise 1.2.3 on A CPU", "60.0 % hit", "5.0 % backfacing", "every one equal",

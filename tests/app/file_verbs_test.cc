@@ -26,7 +26,11 @@ std::vector<Case> cases() {
   const std::vector<std::string> reflection = {"ox", "oy", "oz", "mx", "my", "mz", "pdf", "weight"};
   return {
       {"exact", {"sample"}, Operation::sample_reflection, Sampler::exact, reflection},
-      {"bounded", {"sample", "--sampler", "bounded"}, Operation::sample_reflection, Sampler::bounded, reflection},
+      {"bounded",
+       {"sample", "--sampler", "bounded"},
+       Operation::sample_reflection,
+       Sampler::bounded,
+       reflection},
       {"visible", {"sample", "--sampler", "visible"}, Operation::sample_reflection, Sampler::cap, reflection},
       {"ndf", {"sample", "--sampler", "ndf"}, Operation::sample_reflection, Sampler::ndf, reflection},
       {"normals", {"sample", "--normals"}, Operation::sample_normal, Sampler::cap, {"mx", "my", "mz", "pdf"}},
@@ -56,7 +60,8 @@ OutputColumn<float>& output_column(Batch& batch, const std::string& name) {
 Output expected_output(const Case& c, Batch batch) {
   Output output{.names = c.outputs, .columns = {}};
   output.columns.assign(c.outputs.size(), std::vector<float>(batch.lanes));
-  for (std::size_t k = 0; k < c.outputs.size(); ++k) output_column(batch, c.outputs[k]) = OutputColumn<float>(output.columns[k]);
+  for (std::size_t k = 0; k < c.outputs.size(); ++k)
+    output_column(batch, c.outputs[k]) = OutputColumn<float>(output.columns[k]);
   std::vector<std::uint8_t> status(batch.lanes);
   batch.out.status = status;
   const auto statistics = run(c.operation, batch);
@@ -71,7 +76,8 @@ void expect_same_bits(const Output& a, const Output& b) {
   for (std::size_t c = 0; c < a.names.size(); ++c) {
     ASSERT_EQ(a.columns[c].size(), b.columns[c].size());
     for (std::size_t row = 0; row < a.columns[c].size(); ++row)
-      ASSERT_EQ(std::bit_cast<std::uint32_t>(a.columns[c][row]), std::bit_cast<std::uint32_t>(b.columns[c][row]))
+      ASSERT_EQ(std::bit_cast<std::uint32_t>(a.columns[c][row]),
+                std::bit_cast<std::uint32_t>(b.columns[c][row]))
           << a.names[c] << " in row " << row << ": " << a.columns[c][row] << " and " << b.columns[c][row];
   }
 }
@@ -92,8 +98,8 @@ TEST_P(FileVerbs, CsvAndNpyHoldWhatTheLibraryComputes) {
   for (const std::string in : {"in.csv", "in.npy"})
     for (const std::string out : {"out.csv", "out.npy"}) {
       SCOPED_TRACE(in + " to " + out);
-      const auto result =
-          facetwise(plus(GetParam().arguments, {"--input", directory.path(in), "--output", directory.path(out)}));
+      const auto result = facetwise(
+          plus(GetParam().arguments, {"--input", directory.path(in), "--output", directory.path(out)}));
       ASSERT_EQ(result.code, 0) << result.err;
       EXPECT_EQ(result.out, "");
       expect_same_bits(read_output(directory.path(out)), expected);
@@ -106,8 +112,8 @@ TEST_P(FileVerbs, ServersGiveTheSameFiles) {
   const Server one(directory, "one.sock"), two(directory, "two.sock");
   write_file(directory.path("in.npy"), lanes.npy());
   const auto with = [&](const std::string& out, const std::vector<std::string>& more) {
-    const auto result = facetwise(plus(plus(GetParam().arguments, more),
-                                       {"--input", directory.path("in.npy"), "--output", directory.path(out)}));
+    const auto result = facetwise(plus(plus(GetParam().arguments, more), {"--input", directory.path("in.npy"),
+                                                                          "--output", directory.path(out)}));
     EXPECT_EQ(result.code, 0) << result.err;
     return read_file(directory.path(out));
   };
@@ -175,16 +181,19 @@ TEST(Sample, EmptyAndSingleRowTables) {
     const std::string out = directory.path("out." + extension);
     ASSERT_EQ(facetwise({"sample", "--alpha", "1", "--seed", "1", "--output", out}, "ix,iy,iz\n").code, 0);
     EXPECT_EQ(read_output(out)["status"].size(), 0u);
-    ASSERT_EQ(facetwise({"sample", "--alpha", "1", "--seed", "1", "--output", out}, "ix,iy,iz\n0,0,1\n").code, 0);
+    ASSERT_EQ(facetwise({"sample", "--alpha", "1", "--seed", "1", "--output", out}, "ix,iy,iz\n0,0,1\n").code,
+              0);
     EXPECT_EQ(read_output(out)["status"].size(), 1u);
   }
 }
 
 TEST(Sample, BadLanesAreCountedNotErrors) {
-  const std::string lanes = "ix,iy,iz,alpha_x,alpha_y,pdf\n0,0,1,.5,.5,0\nnan,0,1,.5,.5,0\n0,0,2,.5,.5,0\n0,0,1,5e-5,.5,0\n";
+  const std::string lanes =
+      "ix,iy,iz,alpha_x,alpha_y,pdf\n0,0,1,.5,.5,0\nnan,0,1,.5,.5,0\n0,0,2,.5,.5,0\n0,0,1,5e-5,.5,0\n";
   const auto text = facetwise({"sample", "--seed", "1"}, lanes);
   ASSERT_EQ(text.code, 0);
-  EXPECT_NE(text.err.find("4 lanes: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos) << text.err;
+  EXPECT_NE(text.err.find("4 lanes: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos)
+      << text.err;
   EXPECT_NE(text.err.find("columns not read: pdf"), std::string::npos) << text.err;
   const auto json = facetwise({"sample", "--seed", "1", "--json"}, lanes);
   EXPECT_EQ(json.out, text.out);

@@ -40,12 +40,15 @@ class LyingEngine final : public Engine {
       }
     auto statistics = facetwise::run(operation, copy);
     if (!now) return statistics;
-    if (lie_ == Lie::bit) chosen[1234] = std::bit_cast<float>(std::bit_cast<std::uint32_t>(chosen[1234]) ^ 1u);
+    if (lie_ == Lie::bit)
+      chosen[1234] = std::bit_cast<float>(std::bit_cast<std::uint32_t>(chosen[1234]) ^ 1u);
     if (lie_ == Lie::status) copy.out.status[kLanes - 1] ^= 1;
     if (lie_ == Lie::statistics) ++statistics->occluded;
     return statistics;
   }
-  absl::StatusOr<std::size_t> compact(const Compaction& compaction) override { return facetwise::compact(compaction); }
+  absl::StatusOr<std::size_t> compact(const Compaction& compaction) override {
+    return facetwise::compact(compaction);
+  }
 
  private:
   Lie lie_;
@@ -85,7 +88,8 @@ TEST(Verify, FindsEveryLieInItsBatch) {
 
 TEST(Verify, SaysWhere) {
   const auto verification = verify_with(LyingEngine::Lie::bit, 15);
-  EXPECT_EQ(verification.batches[15].difference.find("out.masking differs in 1 lanes, first in lane 1234: "), 0u)
+  EXPECT_EQ(verification.batches[15].difference.find("out.masking differs in 1 lanes, first in lane 1234: "),
+            0u)
       << verification.batches[15].difference;
 }
 
@@ -99,8 +103,9 @@ TEST(VerifyCases, CoverEverySamplerAndOperation) {
                             }),
               2);
   for (const Operation operation : all_operations())
-    EXPECT_TRUE(std::any_of(cases.begin(), cases.end(), [&](const VerifyCase& c) { return c.operation == operation; }))
-        << name(operation);
+    EXPECT_TRUE(std::any_of(cases.begin(), cases.end(), [&](const VerifyCase& c) {
+      return c.operation == operation;
+    })) << name(operation);
   for (const Sampler sampler : all_samplers()) {
     const Sampler one[] = {sampler};
     for (const VerifyCase& c : verify_cases(one)) EXPECT_EQ(c.sampler, sampler);

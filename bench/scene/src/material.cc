@@ -8,9 +8,9 @@
 namespace facetwise::scene {
 namespace {
 
-constexpr float kBumps = 90.0f;       // bumps of the normal map across the mesh
-constexpr float kSteepness = 1.1f;    // largest slope of one component of the bend
-constexpr float kPatches = 25.0f;     // patches of the roughness texture across the mesh
+constexpr float kBumps = 90.0f;     // bumps of the normal map across the mesh
+constexpr float kSteepness = 1.1f;  // largest slope of one component of the bend
+constexpr float kPatches = 25.0f;   // patches of the roughness texture across the mesh
 
 // Noise in [-1, 1]: random numbers at the points of a lattice, smoothly interpolated.
 float noise(Vector p, std::uint32_t seed) {
@@ -51,7 +51,7 @@ Vector bend_normal(Vector point, Vector normal) {
 }
 
 Roughness roughness(Vector point, std::uint32_t part) {
-  constexpr Roughness kParts[] = {{0.05f, 0.05f}, {0.1f, 0.1f}, {0.3f, 0.3f}, {0.6f, 0.6f},
+  constexpr Roughness kParts[] = {{0.05f, 0.05f}, {0.1f, 0.1f}, {0.3f, 0.3f},  {0.6f, 0.6f},
                                   {0.15f, 0.6f},  {0.8f, 0.1f}, {0.02f, 0.2f}, {0.9f, 0.9f}};
   const Roughness base = kParts[part % std::size(kParts)];
   const float worn = 1.0f + 0.6f * noise(kPatches * point, 4);

@@ -15,9 +15,9 @@ using Vector = std::array<float, 3>;
 
 // Triangles with vertex normals, in world space: a file's instances are resolved.
 struct Mesh {
-  std::vector<Vector> positions, normals;              // per vertex
+  std::vector<Vector> positions, normals;               // per vertex
   std::vector<std::array<std::uint32_t, 3>> triangles;  // vertices
-  std::vector<std::uint32_t> parts;                    // per triangle: which of the file's meshes it is of
+  std::vector<std::uint32_t> parts;                     // per triangle: which of the file's meshes it is of
 };
 
 // Reads any format that assimp knows. Errors begin with the path.
