@@ -40,12 +40,12 @@ logged() {
 
 echo "packages"
 logged install-test cmake/install.sh test
-# arm64 first: the native build includes its tests where they exist.
+# arm64 first: the native build includes its tests.
 echo "build for arm64 (build/arm64)"
 logged configure-arm64 cmake --preset arm64
 logged build-arm64 cmake --build build/arm64
 echo "build (build/release)"
-logged configure-test cmake --preset test
+logged configure-test cmake --preset test -D FACETWISE_TESTS_FROM="$PWD/build/arm64"
 logged build-test cmake --build build/release
 
 export FACETWISE_LONG=$long

@@ -8,9 +8,8 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <sstream>
 #include <string>
+#include <vector>
 
 #include "app/arguments.h"
 #include "app/errors.h"
@@ -44,8 +43,11 @@ std::string millions(double rate) { return rate > 0 ? fmt::format("{:.1f}", 1e-6
 std::string ratio(double a, double b) { return a > 0 && b > 0 ? fmt::format("{:.2f}", a / b) : "-"; }
 
 struct Table {
-  // By operation and sampler, then by roughness.
-  std::map<std::pair<std::string, std::string>, std::map<std::pair<double, double>, Row>> rows;
+  struct Group {
+    std::string operation, sampler;
+    std::map<std::pair<double, double>, Row> by_alpha;
+  };
+  std::vector<Group> groups;  // in the report's order
 
   explicit Table(const Json& report) {
     for (const Json& result : report.at("results")) {
@@ -53,28 +55,33 @@ struct Table {
           std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
       if (found == kImplementations.end() || result.value("inputs", "columns") != "columns") continue;
       const Json& alpha = result.at("alpha");
-      Row& row = rows[{result.at("operation"), result.at("sampler")}][{alpha.at(0), alpha.at(1)}];
+      Row& row = group(result.at("operation"), result.at("sampler")).by_alpha[{alpha.at(0), alpha.at(1)}];
       double& rate = row.rate[static_cast<std::size_t>(found - kImplementations.begin())];
       rate = std::max(rate, result.at("samples_per_second").get<double>());
     }
   }
 
+  Group& group(const std::string& operation, const std::string& sampler) {
+    for (Group& group : groups)
+      if (group.operation == operation && group.sampler == sampler) return group;
+    return groups.emplace_back(Group{operation, sampler, {}});
+  }
+
   void print() const {
+    constexpr const char* kLine = "  {:<20} {:<8} {:>9} {:>7} {:>9} {:>7} {:>8} {:>7} {:>12} {:>13} {:>12}\n";
     fmt::print("\nThroughput, million samples a second, each at its best batch size\n");
-    fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", "operation",
-               "sampler", "alpha", "scalar", "one lane", "SIMD", "threads", "remote", "SIMD/scalar",
-               "threads/SIMD", "remote/SIMD");
-    for (const auto& [what, by_alpha] : rows) {
+    fmt::print(kLine, "operation", "sampler", "alpha", "scalar", "one lane", "SIMD", "threads", "remote",
+               "SIMD/scalar", "threads/SIMD", "remote/SIMD");
+    for (const Group& group : groups) {
       // The roughness that most implementations were measured at.
-      const auto best = std::max_element(by_alpha.begin(), by_alpha.end(), [](const auto& a, const auto& b) {
-        return a.second.measured() < b.second.measured();
-      });
-      const auto& [alpha, row] = *best;
-      fmt::print("  {:<20} {:<8} {:>12} {:>8} {:>9} {:>8} {:>8} {:>8} {:>12} {:>13} {:>12}\n", what.first,
-                 what.second, fmt::format("{}, {}", alpha.first, alpha.second), millions(row.rate[kScalar]),
-                 millions(row.rate[kOneLane]), millions(row.rate[kSimd]), millions(row.rate[kThreads]),
-                 millions(row.rate[kRemote]), ratio(row.rate[kSimd], row.rate[kScalar]),
-                 ratio(row.rate[kThreads], row.rate[kSimd]), ratio(row.rate[kRemote], row.rate[kSimd]));
+      const auto& [alpha, row] = *std::max_element(
+          group.by_alpha.begin(), group.by_alpha.end(),
+          [](const auto& a, const auto& b) { return a.second.measured() < b.second.measured(); });
+      const auto& rate = row.rate;
+      fmt::print(kLine, group.operation, group.sampler, fmt::format("{}, {}", alpha.first, alpha.second),
+                 millions(rate[kScalar]), millions(rate[kOneLane]), millions(rate[kSimd]),
+                 millions(rate[kThreads]), millions(rate[kRemote]), ratio(rate[kSimd], rate[kScalar]),
+                 ratio(rate[kThreads], rate[kSimd]), ratio(rate[kRemote], rate[kSimd]));
     }
   }
 };
