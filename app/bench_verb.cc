@@ -11,7 +11,6 @@
 #include "app/verbs.h"
 #include "facetwise/bench.h"
 #include "facetwise/client.h"
-#include "facetwise/tune_malloc.h"
 
 namespace facetwise::app {
 namespace {
@@ -23,7 +22,6 @@ struct BenchVerb {
   bool full = false, quick = false, no_limits = false, no_rejections = false, no_targets = false;
 
   int run() {
-    tune_malloc();
     // Made first: a file that cannot be written should not be found out after minutes.
     std::optional<OutputFile> file;
     if (!json.empty()) {

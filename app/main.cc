@@ -6,6 +6,7 @@
 
 #include "app/verbs.h"
 #include "facetwise/engine.h"
+#include "facetwise/tune_malloc.h"
 
 namespace {
 
@@ -28,6 +29,7 @@ int main(int argc, char** argv) {
   using namespace facetwise::app;
   // A reader of our output that goes away is an error of the write, with a message.
   std::signal(SIGPIPE, SIG_IGN);
+  facetwise::tune_malloc();  // for messages to and from servers
 
   CLI::App app{kAbout, "facetwise"};
   app.set_version_flag("--version", std::string(facetwise::version()));

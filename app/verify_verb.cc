@@ -13,7 +13,6 @@
 #include "app/table/output_file.h"
 #include "app/verbs.h"
 #include "app/verify.h"
-#include "facetwise/tune_malloc.h"
 
 namespace facetwise::app {
 namespace {
@@ -131,7 +130,6 @@ struct VerifyVerb {
 
   int run() {
     flush_denormals();
-    tune_malloc();
     if (mesh.empty()) {
       auto found = scene::default_mesh();
       if (!found.ok()) return fail("verify", found.status());
