@@ -81,41 +81,58 @@ double value_at(const Lobe& lobe, const Integrand& integrand, double t, double p
   return jacobian * integrand(m, reflect(lobe.i, m));
 }
 
-// Integrals over phi in [a, b] of all t cells, by the outer rule.
+// The integral over t in [low, high] at one phi.
+double along(const Lobe& lobe, const Integrand& integrand, double low, double high, double phi) {
+  const auto& rule = inner_rule();
+  double sum = 0;
+  for (std::size_t n = 0; n < rule.x.size(); ++n)
+    sum += rule.w[n] * value_at(lobe, integrand, (low + high) / 2 + (high - low) / 2 * rule.x[n], phi);
+  return sum * (high - low) / 2;
+}
+
+double along_adaptive(const Lobe& lobe, const Integrand& integrand, double low, double high, double phi,
+                      double whole, double tolerance, int depth) {
+  const double middle = (low + high) / 2;
+  const double left = along(lobe, integrand, low, middle, phi),
+               right = along(lobe, integrand, middle, high, phi);
+  if (std::abs(whole - left - right) <= tolerance || depth == 0) return left + right;
+  return along_adaptive(lobe, integrand, low, middle, phi, left, tolerance, depth - 1) +
+         along_adaptive(lobe, integrand, middle, high, phi, right, tolerance, depth - 1);
+}
+
+// Integrals over phi in [a, b] of all t cells, by the outer rule. tolerance_t > 0: adaptive in t, too.
 void strip(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b,
-           std::vector<double>& sums) {
+           double tolerance_t, std::vector<double>& sums) {
   std::fill(sums.begin(), sums.end(), 0.0);
   const auto& outer = outer_rule();
-  const auto& inner = inner_rule();
   for (std::size_t k = 0; k < outer.x.size(); ++k) {
     const double phi = (a + b) / 2 + (b - a) / 2 * outer.x[k];
     const Interval part = meridian(lobe, phi);
     for (std::size_t cell = 0; cell + 1 < grid.t.size(); ++cell) {
       const double low = std::max(grid.t[cell], part.low), high = std::min(grid.t[cell + 1], part.high);
       if (!(low < high)) continue;
-      double sum = 0;
-      for (std::size_t n = 0; n < inner.x.size(); ++n)
-        sum += inner.w[n] * value_at(lobe, integrand, (low + high) / 2 + (high - low) / 2 * inner.x[n], phi);
-      sums[cell] += sum * (high - low) / 2 * outer.w[k] * (b - a) / 2;
+      double sum = along(lobe, integrand, low, high, phi);
+      if (tolerance_t > 0) sum = along_adaptive(lobe, integrand, low, high, phi, sum, tolerance_t, 30);
+      sums[cell] += sum * outer.w[k] * (b - a) / 2;
     }
   }
 }
 
 void refine(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b,
-            const std::vector<double>& whole, double tolerance, int depth, double* out) {
+            const std::vector<double>& whole, double tolerance, double tolerance_t, int depth, double* out) {
   const std::size_t cells = whole.size();
   std::vector<double> left(cells), right(cells);
   const double middle = (a + b) / 2;
-  strip(lobe, grid, integrand, a, middle, left);
-  strip(lobe, grid, integrand, middle, b, right);
+  strip(lobe, grid, integrand, a, middle, tolerance_t, left);
+  strip(lobe, grid, integrand, middle, b, tolerance_t, right);
   double error = 0;
   for (std::size_t n = 0; n < cells; ++n) error = std::max(error, std::abs(whole[n] - left[n] - right[n]));
   if (error <= tolerance || depth == 0) {
     for (std::size_t n = 0; n < cells; ++n) out[n] += left[n] + right[n];
     return;
   }
-  refine(lobe, grid, integrand, a, middle, left, tolerance, depth - 1, out);
-  refine(lobe, grid, integrand, middle, b, right, tolerance, depth - 1, out);
+  refine(lobe, grid, integrand, a, middle, left, tolerance, tolerance_t, depth - 1, out);
+  refine(lobe, grid, integrand, middle, b, right, tolerance, tolerance_t, depth - 1, out);
 }
 
 // Edges that cut a histogram over [low, high] into equal parts.
@@ -177,30 +194,32 @@ Grid make_grid(const Lobe& lobe, const Integrand& integrand, int t_cells, int ph
           quantiles(of_phi, 0, kTwoPi, phi_cells, 0, kTwoPi)};
 }
 
-std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
-                                    double tolerance) {
+namespace {
+
+std::vector<double> integrate_grid(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
+                                   double tolerance, double tolerance_t) {
   std::vector<double> cells(grid.cells());
   std::vector<double> whole(grid.t.size() - 1);
   for (std::size_t p = 0; p + 1 < grid.phi.size(); ++p) {
-    strip(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole);
-    refine(lobe, grid, integrand, grid.phi[p], grid.phi[p + 1], whole, tolerance, 20,
-           &cells[grid.index(p, 0)]);
+    const double a = grid.phi[p], b = grid.phi[p + 1];
+    strip(lobe, grid, integrand, a, b, tolerance_t, whole);
+    refine(lobe, grid, integrand, a, b, whole, tolerance, tolerance_t, 20, &cells[grid.index(p, 0)]);
   }
   return cells;
 }
 
-double integrate(const Lobe& lobe, const Integrand& integrand, double tolerance) {
-  double sum = 0;
-  for (double cell : integrate_cells(lobe, make_grid(lobe, integrand, 12, 12), integrand, tolerance))
-    sum += cell;
-  return sum;
+}  // namespace
+
+std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
+                                    double tolerance) {
+  return integrate_grid(lobe, grid, integrand, tolerance, 0);
 }
 
-Vector normal_at(const Lobe& lobe, double t, double phi) {
-  const Vector big = {lobe.alpha.x * std::sin(t) * std::cos(phi), lobe.alpha.y * std::sin(t) * std::sin(phi),
-                      std::cos(t)};
-  const double length = std::sqrt(big.x * big.x + big.y * big.y + big.z * big.z);
-  return {big.x / length, big.y / length, big.z / length};
+double integrate(const Lobe& lobe, const Integrand& integrand, double tolerance) {
+  double sum = 0;
+  const Grid grid = make_grid(lobe, integrand, 8, 8);
+  for (double cell : integrate_grid(lobe, grid, integrand, tolerance, tolerance)) sum += cell;
+  return sum;
 }
 
 Vector reflect(Vector i, Vector m) {

@@ -40,15 +40,15 @@ struct Grid {
 // A grid whose rows, and whose columns, hold equal parts of the integral, roughly.
 Grid make_grid(const Lobe& lobe, const Integrand& integrand, int t_cells, int phi_cells);
 
-// The integral over each cell; the error of each is about `tolerance`.
+// The integral over each cell; the error of each is about `tolerance`. For densities of samplers, which are
+// smooth along t inside the lobe.
 std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
                                     double tolerance);
 
-// The integral over the whole lobe.
+// The integral over the whole lobe of anything.
 double integrate(const Lobe& lobe, const Integrand& integrand, double tolerance = 1e-10);
 
-// m (of unit length) and o for a point of the stretched hemisphere.
-reference::Vector normal_at(const Lobe& lobe, double t, double phi);
+// o for a normal m of unit length.
 reference::Vector reflect(reference::Vector i, reference::Vector m);
 
 }  // namespace facetwise::test

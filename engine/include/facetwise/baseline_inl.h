@@ -211,8 +211,8 @@ inline Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, 
 inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, float alpha_y) {
   using namespace internal;
   const Vector h = i + o;
-  const float ih = dot(i, h);
-  if (o.z <= 0 || h.z <= 0 || ih <= 0) return 0;
+  if (o.z <= 0 || h.z <= 0) return 0;
+  const float ih = dot(h, h) / 2;
   const Stretched s = stretch(i, alpha_x, alpha_y);
   return distribution(normalize(h), alpha_x, alpha_y) /
          (4 * normaliser(sampler, i, s, ih, h.z, alpha_x, alpha_y));
@@ -221,7 +221,7 @@ inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, 
 inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y) {
   using namespace internal;
   const Vector h = i + o;
-  if (o.z <= 0 || h.z <= 0 || dot(i, h) <= 0) return 0;
+  if (o.z <= 0 || h.z <= 0) return 0;
   const Stretched s = stretch(i, alpha_x, alpha_y);
   return shadowing_weight(shadowing, i, s, o, alpha_x, alpha_y) *
          distribution(normalize(h), alpha_x, alpha_y) / (4 * s.area);

@@ -19,9 +19,9 @@ double bound(Roughness alpha, Vector i) {
   return (1 - a) * (1 + a) * s * s / (s * s + a * a * i.z * i.z);
 }
 
-// N in p(o) = D(m) / (4 N): what the sampler normalises densities by.
-double normaliser(Sampler sampler, Roughness alpha, Vector i, Vector m) {
-  if (sampler == Sampler::ndf) return dot(i, m) / m.z;
+// N in p(o) = D(m) / (4 N): what the sampler normalises densities by. im is i.m.
+double normaliser(Sampler sampler, Roughness alpha, Vector i, Vector m, double im) {
+  if (sampler == Sampler::ndf) return im / m.z;
   if (i.z > 0 && sampler == Sampler::exact) return unoccluded_cone(alpha, i).k;
   if (i.z > 0 && sampler == Sampler::bounded) return (bound(alpha, i) * i.z + length(stretch(alpha, i))) / 2;
   return projected_area(alpha, i);
@@ -96,15 +96,15 @@ double bounded_k(Roughness alpha, Vector i) { return i.z > 0 ? bound(alpha, i) :
 double pdf_normal(Sampler sampler, Roughness alpha, Vector i, Vector m) {
   const double im = dot(i, m);
   if (im <= 0 || m.z <= 0) return 0;
-  return distribution(alpha, m) * im / normaliser(sampler, alpha, i, m);
+  return distribution(alpha, m) * im / normaliser(sampler, alpha, i, m, im);
 }
 
 double pdf_reflection(Sampler sampler, Roughness alpha, Vector i, Vector o) {
   const Vector h = i + o;
-  // dot(i, h) is 0 for o = -i alone.
-  if (o.z <= 0 || h.z <= 0 || dot(i, h) <= 0) return 0;
+  if (o.z <= 0 || h.z <= 0) return 0;
   const Vector m = normalize(h);
-  return distribution(alpha, m) / (4 * normaliser(sampler, alpha, i, m));
+  // i.m is |h| / 2 for unit vectors; dot(i, m) would be rounding alone where o is nearly -i.
+  return distribution(alpha, m) / (4 * normaliser(sampler, alpha, i, m, length(h) / 2));
 }
 
 Sample sample_normal(Sampler sampler, Roughness alpha, Vector i, double u1, double u2, double u3) {
@@ -128,7 +128,7 @@ Sample sample_reflection(const Model& model, Sampler sampler, Roughness alpha, V
   }
   // From m itself: the half vector of o would lose digits. f cos(theta_o) = w D / (4 sigma), so that D
   // cancels in the weight.
-  const double n = normaliser(sampler, alpha, i, sample.m);
+  const double n = normaliser(sampler, alpha, i, sample.m, sample.incident_dot_normal);
   sample.pdf = distribution(alpha, sample.m) / (4 * n);
   sample.weight = shadowing_weight(model.shadowing, alpha, i, sample.o) * n / projected_area(alpha, i);
   return sample;
