@@ -1,0 +1,167 @@
+#include "support/call.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace facetwise::test {
+namespace {
+
+constexpr float kBelowOne = 0x1.fffffep-1f;
+
+// A unit vector whose z is `z` before the sign: only sqrt, * and /.
+struct Vector {
+  float x, y, z;
+};
+Vector direction(std::uint64_t seed, std::uint64_t lane, float z) {
+  for (std::uint64_t attempt = 0;; ++attempt) {
+    const float x = 2 * uniform(seed, 64 * lane + 2 * attempt) - 1;
+    const float y = 2 * uniform(seed, 64 * lane + 2 * attempt + 1) - 1;
+    const float r2 = x * x + y * y;
+    if (r2 > 1 || r2 < 0.01f) continue;
+    const float scale = std::sqrt(1 - z * z) / std::sqrt(r2);
+    return {x * scale, y * scale, z};
+  }
+}
+
+Vector any_direction(std::uint64_t seed, std::uint64_t lane, bool queried) {
+  const float u = uniform(seed + 1, lane);
+  const float sign = queried && hash(seed + 2, lane) % 8 != 0 ? 1.0f : -1.0f;
+  switch (hash(seed + 3, lane) % 10) {
+    case 0: return {0, 0, 1};
+    case 1: return direction(seed, lane, u * 1e-3f);         // grazing
+    case 2: return direction(seed, lane, u * 1e-6f);
+    case 3: return direction(seed, lane, sign * u * 1e-3f);
+    case 4: return direction(seed, lane, sign * u);          // behind, for incident directions
+    case 5: return direction(seed, lane, -1 + u * 1e-4f);
+    default: return direction(seed, lane, u);
+  }
+}
+
+float any_alpha(std::uint64_t seed, std::uint64_t lane) {
+  constexpr float kAlphas[] = {1e-4f, 1e-3f, 0.01f, 0.05f, 0.1f, 0.3f, 0.5f, 0.8f, 1.0f, 1.5f, 2.0f, 4.0f, 10.0f};
+  const std::uint64_t bits = hash(seed, lane);
+  return bits % 2 == 0 ? kAlphas[(bits >> 8) % std::size(kAlphas)] : 0.01f + uniform(seed + 1, lane);
+}
+
+float any_u(std::uint64_t seed, std::uint64_t lane) {
+  const std::uint64_t kind = hash(seed, lane) % 32;
+  return kind == 0 ? 0.0f : kind == 1 ? kBelowOne : kind == 2 ? 1e-30f : uniform(seed + 1, lane);
+}
+
+}  // namespace
+
+std::uint64_t hash(std::uint64_t seed, std::uint64_t index) {
+  std::uint64_t z = seed * 0xD1342543DE82EF95u + (index + 1) * 0x9E3779B97F4A7C15u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  return z ^ (z >> 31);
+}
+
+float uniform(std::uint64_t seed, std::uint64_t index) {
+  return static_cast<float>(hash(seed, index) >> 40) * 0x1p-24f;
+}
+
+std::string call_name(const Call& call) {
+  std::string name(facetwise::name(call.operation));
+  if (call.operation != Operation::masking && call.operation != Operation::evaluate_reflection)
+    name += "/" + std::string(facetwise::name(call.sampler));
+  if (call.shadowing == Shadowing::uncorrelated) name += "/uncorrelated";
+  return name;
+}
+
+void PrintTo(const Call& call, std::ostream* to) { *to << call_name(call); }
+
+std::vector<Call> all_calls() {
+  std::vector<Call> calls;
+  for (const Operation operation : all_operations()) {
+    const bool one_sampler = operation == Operation::masking || operation == Operation::evaluate_reflection;
+    const bool shadowed = operation == Operation::sample_reflection ||
+                          operation == Operation::evaluate_reflection || operation == Operation::evaluate_and_pdf;
+    for (const Sampler sampler : all_samplers()) {
+      if (one_sampler && sampler != Sampler::cap) continue;
+      if (operation == Operation::sample_normal && !samples_normals(sampler)) continue;
+      calls.push_back({operation, sampler, Shadowing::correlated});
+      if (shadowed) calls.push_back({operation, sampler, Shadowing::uncorrelated});
+    }
+  }
+  return calls;
+}
+
+Lanes ordinary_lanes(std::size_t count, std::uint64_t seed) {
+  Lanes lanes;
+  lanes.count = count;
+  lanes.in.assign(input_fields().size(), std::vector<float>(count));
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    const Vector i = any_direction(100 * seed + 1, lane, false), o = any_direction(100 * seed + 11, lane, true);
+    const float alpha_x = any_alpha(100 * seed + 21, lane);
+    // Stretches of isotropic lanes, so that whole vectors of them and mixed ones occur.
+    const bool isotropic = (lane / 64) % 2 == 0 || hash(100 * seed + 31, lane) % 3 == 0;
+    const float alpha_y = isotropic ? alpha_x : any_alpha(100 * seed + 41, lane);
+    const float values[] = {i.x, i.y, i.z, alpha_x, alpha_y, o.x, o.y, o.z,
+                            any_u(100 * seed + 51, lane), any_u(100 * seed + 61, lane),
+                            any_u(100 * seed + 71, lane)};
+    for (std::size_t k = 0; k < lanes.in.size(); ++k) lanes.in[k][lane] = values[k];
+  }
+  return lanes;
+}
+
+Lanes adversarial_lanes(std::size_t count, std::uint64_t seed) {
+  Lanes lanes = ordinary_lanes(count, seed);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
+  constexpr float kBad[] = {kNan, -kNan, kInf, -kInf, -0.0f, 0.0f, 1e-40f, -1e-40f, 5e-5f, 9.99e-5f, 10.001f,
+                            1.0f, 1.0005f, -1.0f, 0x1p100f, 2.0f, -0.1f};
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    const std::uint64_t bits = hash(seed + 1000, lane);
+    if ((lane / 128) % 2 == 0 || bits % 6 != 0) continue;
+    float& value = lanes.in[(bits >> 8) % lanes.in.size()][lane];
+    value = (bits >> 16) % 4 == 0 ? std::bit_cast<float>(static_cast<std::uint32_t>(bits >> 32))
+                                  : kBad[(bits >> 24) % std::size(kBad)];
+  }
+  return lanes;
+}
+
+bool same_bits(const Answer& a, const Answer& b) {
+  if (a.statistics != b.statistics || a.status != b.status || a.out.size() != b.out.size()) return false;
+  for (std::size_t k = 0; k < a.out.size(); ++k) {
+    if (a.out[k].size() != b.out[k].size()) return false;
+    if (!a.out[k].empty() && std::memcmp(a.out[k].data(), b.out[k].data(), 4 * a.out[k].size()) != 0) return false;
+  }
+  return true;
+}
+
+std::uint64_t digest(const Answer& answer) {
+  std::uint64_t digest = 0;
+  for (const auto& column : answer.out)
+    for (const float value : column) digest = hash(digest, std::bit_cast<std::uint32_t>(value));
+  for (const std::uint8_t status : answer.status) digest = hash(digest, status);
+  return digest;
+}
+
+Batch make_batch(const Call& call, const Lanes& lanes, Answer& answer) {
+  Batch batch;
+  batch.model.shadowing = call.shadowing;
+  batch.sampler = call.sampler;
+  batch.lanes = lanes.count;
+  for (std::size_t k = 0; k < lanes.in.size(); ++k)
+    if (input_fields()[k].operations & bit(call.operation)) input_fields()[k].column(batch) = lanes.in[k];
+  answer.out.resize(output_fields().size());
+  for (std::size_t k = 0; k < answer.out.size(); ++k) {
+    if (!(output_fields()[k].operations & bit(call.operation))) continue;
+    answer.out[k].assign(lanes.count, -7.0f);
+    output_fields()[k].column(batch) = answer.out[k];
+  }
+  answer.status.assign(lanes.count, 77);
+  batch.out.status = answer.status;
+  return batch;
+}
+
+Answer run_call(const Call& call, const Lanes& lanes, const Execution& execution) {
+  Answer answer;
+  const auto statistics = run(call.operation, make_batch(call, lanes, answer), execution);
+  if (statistics.ok()) answer.statistics = *statistics;
+  return answer;
+}
+
+}  // namespace facetwise::test
