@@ -34,10 +34,10 @@ std::span<const Operation> all_operations();
 
 // Three columns of unit vectors in the local frame (model.h).
 struct Direction {
-  Column<float> x, y, z;
+  Column<float> x{}, y{}, z{};
 };
 struct OutputDirection {
-  OutputColumn<float> x, y, z;
+  OutputColumn<float> x{}, y{}, z{};
 };
 
 // In-kernel random numbers: Philox4x32-10 (Salmon et al. 2011) with key = seed and counter =
@@ -47,7 +47,7 @@ struct OutputDirection {
 struct Generator {
   std::uint64_t seed = 0;
   std::uint32_t dimension = 0;
-  Column<std::uint64_t> id;
+  Column<std::uint64_t> id{};
   std::uint64_t first_id = 0;
 };
 
@@ -58,32 +58,32 @@ struct Generator {
 // An output may be the same memory as an input of the same lane (same address, same stride); any other
 // overlap is an error.
 struct Batch {
-  Model model;
+  Model model{};
   Sampler sampler = Sampler::exact;
 
   std::size_t lanes = 0;  // length of every column; any number, 0 included
   // If given, only these lanes are read and written, in any order, each at most once. Indices < lanes.
-  std::optional<std::span<const std::uint32_t>> active;
+  std::optional<std::span<const std::uint32_t>> active{};
 
-  Direction incident;              // i
-  Direction outgoing;              // o, for queries
-  Column<float> alpha_x, alpha_y;  // roughness, [1e-4, 10]
-  Column<float> u1, u2, u3;        // uniform in [0, 1); u3 only for samplers that use it
-  std::optional<Generator> generator;  // instead of u1, u2, u3
+  Direction incident{};                  // i
+  Direction outgoing{};                  // o, for queries
+  Column<float> alpha_x{}, alpha_y{};    // roughness, [1e-4, 10]
+  Column<float> u1{}, u2{}, u3{};        // uniform in [0, 1); u3 only for samplers that use it
+  std::optional<Generator> generator{};  // instead of u1, u2, u3
 
   struct Outputs {
-    OutputDirection outgoing;                   // o
-    OutputDirection normal;                     // m
-    OutputColumn<float> incident_dot_normal;    // i.m
-    OutputColumn<float> pdf;                    // 1/sr, of o (of m for sample_normal)
-    OutputColumn<float> weight;                 // f cos(theta_o) / pdf with F = 1
-    OutputColumn<float> value;                  // f cos(theta_o) with F = 1, 1/sr
-    OutputColumn<float> masking;                // G1(i), 0 for i_z <= 0
-    OutputColumn<float> projected_area;         // sigma(i)
-    OutputColumn<float> share_unoccluded;       // K/sigma: share of visible normals whose reflection is not
+    OutputDirection outgoing{};                 // o
+    OutputDirection normal{};                   // m
+    OutputColumn<float> incident_dot_normal{};  // i.m
+    OutputColumn<float> pdf{};                  // 1/sr, of o (of m for sample_normal)
+    OutputColumn<float> weight{};               // f cos(theta_o) / pdf with F = 1
+    OutputColumn<float> value{};                // f cos(theta_o) with F = 1, 1/sr
+    OutputColumn<float> masking{};              // G1(i), 0 for i_z <= 0
+    OutputColumn<float> projected_area{};       // sigma(i)
+    OutputColumn<float> share_unoccluded{};     // K/sigma: share of visible normals whose reflection is not
                                                 // occluded, the share that `cap` keeps
-    OutputColumn<std::uint8_t> status;          // LaneStatus
-  } out;
+    OutputColumn<std::uint8_t> status{};        // LaneStatus
+  } out{};
 };
 
 // What became of the lanes of a call, exact whatever the threads.

@@ -44,17 +44,17 @@ inline absl::StatusOr<Statistics> masking(const Batch& batch, const Execution& e
 // Compaction of accepted lanes, stable in order: what a wavefront queue keeps after sampling.
 struct Compaction {
   std::size_t lanes = 0;
-  std::optional<std::span<const std::uint32_t>> active;  // as in Batch; the order is this list's
-  Column<std::uint8_t> status;                           // LaneStatus per lane
+  std::optional<std::span<const std::uint32_t>> active{};  // as in Batch; the order is this list's
+  Column<std::uint8_t> status{};                           // LaneStatus per lane
 
   // Where the k-th accepted lane's index goes. Room for as many lanes as there are (all or active).
-  OutputColumn<std::uint32_t> index;
+  OutputColumn<std::uint32_t> index{};
   // Dense columns: to[k] = from[k-th accepted lane]. `to` has room as `index` has, and is separate memory.
   struct DenseColumn {
-    Column<float> from;
-    OutputColumn<float> to;
+    Column<float> from{};
+    OutputColumn<float> to{};
   };
-  std::span<const DenseColumn> columns;
+  std::span<const DenseColumn> columns{};
 };
 
 // Returns the number of accepted lanes. Values past it are left as they were.

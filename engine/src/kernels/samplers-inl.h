@@ -24,7 +24,7 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 // i.M of visible normals is kept above this, where rounding could make it 0 or negative. `ndf` rejects below.
-inline constexpr float kSmallestIm = 0x1p-80f;
+inline constexpr float kSmallestIm = 0x1p-84f;
 
 template <class D>
 struct Drawn {
@@ -142,6 +142,11 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but by M itself, so that o is its reflection even where m_hat is short.
   drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
+  // Where A is not what w has (ggx-inl.h, kSmallestA).
+  if (!i.all_front) {
+    const V half_hh = Dot(hx, hy, hz, hx, hy, hz) * Set(d, 0.5f);
+    drawn.im = Select(Or(i.front, i.a >= Set(d, kSmallestA)), drawn.im, half_hh);
+  }
   drawn.two_n = t;
 }
 
