@@ -88,7 +88,8 @@ HWY_INLINE V StartLambda(D d, const Incident<D>& i, const Roughness<D>& roughnes
   if (roughness.any_rough) {
     const V numerator = Fma(i.z, mean, i.a);
     const V conjugate = (numerator + numerator) / (root - difference);
-    lambda = Select(difference < Zero(d), conjugate, lambda);
+    // Only there: what a lane takes may not depend on its neighbours.
+    lambda = Select(And(roughness.rough, difference < Zero(d)), conjugate, lambda);
   }
   return lambda;
 }

@@ -25,6 +25,8 @@ namespace HWY_NAMESPACE {
 
 // i.M of visible normals is kept above this, where rounding could make it 0 or negative. `ndf` rejects below.
 inline constexpr float kSmallestIm = 0x1p-84f;
+// Likewise m_hat_z (times nu, for half vectors); its square does not underflow.
+inline constexpr float kSmallestZ = 0x1p-62f;
 
 template <class D>
 struct Drawn {
@@ -74,7 +76,7 @@ struct Ndf {
 //   m_hat = t1 (-e_y, e_x, 0) + t2 (-c e_x, -c e_y, s_hat) + t_w w / nu,
 //   t1 = r cos phi,  R^2 = 1 - t1^2,  t2 = R - s (R - r sin phi),  t_w^2 = R^2 - t2^2.
 // R - r sin phi and R + r sin phi have the product 1 - u1, so that neither needs to cancel; with
-// b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (2R - s b).
+// b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (p + (1 - s) b).
 struct Heitz {
   static constexpr bool kUnit = true;
   static constexpr bool kUsesU3 = false;
@@ -109,17 +111,22 @@ struct Heitz {
     const V larger = big_r + Abs(radial), smaller = rest / larger;
     const auto upper = radial > zero;
     const V b = Select(upper, smaller, larger), p = Select(upper, larger, smaller);
-    const V t2 = NegFma(s, b, big_r);
-    const V tw = Sqrt(s * b * NegFma(s, b, big_r + big_r));
+    const V t2 = half * NegFma(c, b, p);  // R - s b
+    const V rest_s = one - s;
+    const V tw = Sqrt(s * b * Fma(rest_s, b, p));
 
     const V radial_xy = Fma(tw, s_hat, Neg(t2 * c));
     const V hx = Fma(radial_xy, ex, Neg(t1 * ey)), hy = Fma(radial_xy, ey, t1 * ex);
-    // m_hat_z = t2 s_hat + t_w c; behind it cancels, and is s p (2R |c| + s p) / (t2 s_hat + t_w |c|).
-    const V sum = Fma(t2, s_hat, tw * Abs(c));
-    V hz = sum;
-    if (!i.all_front) {
-      hz = Select(i.front, hz, s * p * Fma(big_r + big_r, Abs(c), s * p) / sum);
+    // m_hat_z = t2 s_hat + t_w c; where the terms' signs differ it cancels, and is s p X / (|t2| s_hat + t_w |c|) with
+    // X = 2R |c| + s p behind (c <= 0), X = s b - 2R (1 - s) in front.
+    V hz = Fma(t2, s_hat, tw * c);
+    const auto cancels = Or(Not(i.front), t2 < zero);
+    if (!AllFalse(d, cancels)) {
+      const V two_r = big_r + big_r, sum = Fma(Abs(t2), s_hat, tw * Abs(c));
+      const V x = Select(i.front, NegFma(two_r, rest_s, s * b), Fma(two_r, Abs(c), s * p));
+      hz = Select(cancels, s * p * x / sum, hz);
     }
+    hz = Max(hz, Set(d, kSmallestZ));
     Unstretch(i, hx, hy, hz, drawn);
     // nu t_w, but by M itself, so that o is its reflection to the last digits.
     drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
@@ -138,7 +145,7 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   const V radius = Sqrt(height * (i.nu + i.nu - height));
   const V hx = Fma(radius, cos, i.wx), hy = Fma(radius, sin, i.wy);
   V hz = Fma(t, Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
-  if (!i.all_front) hz = Max(hz, Set(d, 0x1p-62f));  // t can be so small that hz^2 underflows
+  if (!i.all_front) hz = Max(hz, Set(d, kSmallestZ));  // t can be very small
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but by M itself, so that o is its reflection even where m_hat is short.
   drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
