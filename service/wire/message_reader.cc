@@ -16,7 +16,10 @@ std::optional<MessageReader::Field> MessageReader::next() {
   return Field{WireFormatLite::GetTagFieldNumber(tag_), static_cast<int>(WireFormatLite::GetTagWireType(tag_))};
 }
 
-bool MessageReader::finished() { return stream_.BytesUntilLimit() == 0; }
+bool MessageReader::finished() {
+  // The first is false where a tag was cut short, the second where one was damaged.
+  return stream_.ConsumedEntireMessage() && stream_.BytesUntilLimit() == 0;
+}
 
 bool MessageReader::varint(const Field& field, std::uint64_t& value) {
   return field.wire_type == WireFormatLite::WIRETYPE_VARINT && stream_.ReadVarint64(&value);

@@ -4,6 +4,7 @@
 #include "facetwise/v1/sampler.grpc.pb.h"
 #include "src/pieces.h"
 #include "src/pipeline.h"
+#include "wire/keep_grpc.h"
 #include "wire/status.h"
 
 namespace facetwise {
@@ -61,6 +62,8 @@ grpc::ChannelArguments channel_arguments(const std::string& address) {
   // Without keepalive a server that was stopped or cut off costs each call its whole deadline.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 20000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+  // A server that starts again is found within a second.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // Engines do not share connections, whatever process-wide state they would come from.
@@ -87,6 +90,7 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
   for (const std::string& address : addresses)
     if (auto status = check_address(address); !status.ok()) return status;
 
+  wire::keep_grpc();
   std::vector<Connection> connections;
   for (const std::string& address : addresses) {
     auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments(address));

@@ -21,10 +21,10 @@ SamplerService::SamplerService(const ServerOptions& options)
       limits_{options.max_message_bytes},
       admission_(options.max_calls, options.max_bytes_in_flight),
       compute_(options.threads, options.execution) {
-  add_unary("/facetwise.v1.Sampler/Run", answer_batch);
-  add_stream("/facetwise.v1.Sampler/RunStream", answer_batch);
-  add_unary("/facetwise.v1.Sampler/Compact", answer_compact);
-  add_stream("/facetwise.v1.Sampler/CompactStream", answer_compact);
+  add("/facetwise.v1.Sampler/Run", answer_batch, Messages::one);
+  add("/facetwise.v1.Sampler/RunStream", answer_batch, Messages::many);
+  add("/facetwise.v1.Sampler/Compact", answer_compact, Messages::one);
+  add("/facetwise.v1.Sampler/CompactStream", answer_compact, Messages::many);
   AddMethod(new RpcServiceMethod(
       "/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
       new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
@@ -42,40 +42,29 @@ SamplerService::SamplerService(const ServerOptions& options)
           this)));
 }
 
-void SamplerService::add_unary(const char* name, Answer answer) {
-  AddMethod(new RpcServiceMethod(
-      name, RpcMethod::NORMAL_RPC,
-      new grpc::internal::RpcMethodHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
-          [answer](SamplerService* service, grpc::ServerContext* context, const grpc::ByteBuffer* request,
-                   grpc::ByteBuffer* response) {
-            // The handler's own object: emptied as soon as it is read.
-            return service->unary(answer, *context, const_cast<grpc::ByteBuffer&>(*request), *response);
-          },
-          this)));
-}
-
-void SamplerService::add_stream(const char* name, Answer answer) {
+void SamplerService::add(const char* name, Answer answer, Messages messages) {
   AddMethod(new RpcServiceMethod(
       name, RpcMethod::BIDI_STREAMING,
       new grpc::internal::BidiStreamingHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
-          [answer](SamplerService* service, grpc::ServerContext* context, Stream* stream) {
-            return service->stream(answer, *context, *stream);
+          [=](SamplerService* service, grpc::ServerContext* context, Stream* stream) {
+            return messages == Messages::one ? service->answer_one(answer, *context, *stream)
+                                             : service->answer_many(answer, *context, *stream);
           },
           this)));
 }
 
-grpc::Status SamplerService::unary(Answer answer, grpc::ServerContext& context, grpc::ByteBuffer& request,
-                                   grpc::ByteBuffer& response) {
+grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& context, Stream& stream) {
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
-  if (context.IsCancelled()) return grpc::Status::CANCELLED;
+  grpc::ByteBuffer request;
+  if (!stream.Read(&request) || context.IsCancelled()) return grpc::Status::CANCELLED;
   auto answered = answer(request, {limits_, compute_, admission_, ticket});
   if (!answered.ok()) return to_grpc(answered.status());
-  response.Swap(&*answered);
+  stream.WriteLast(*answered, {});
   return grpc::Status::OK;
 }
 
-grpc::Status SamplerService::stream(Answer answer, grpc::ServerContext& context, Stream& stream) {
+grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& context, Stream& stream) {
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
   for (grpc::ByteBuffer request; stream.Read(&request);) {

@@ -19,6 +19,8 @@ namespace facetwise {
 
 // The calls that move columns are handled as bytes, so that columns are read and written in place; the rest
 // are generated messages. Registers itself as generated code does, since that has no synchronous raw calls.
+// Unary calls that move columns are registered as streams (the wire is the same): a call is then counted, or
+// refused, when it begins, not when gRPC has read its request.
 class SamplerService final : public grpc::Service {
  public:
   explicit SamplerService(const ServerOptions& options);
@@ -29,11 +31,11 @@ class SamplerService final : public grpc::Service {
   using Stream = grpc::ServerReaderWriter<grpc::ByteBuffer, grpc::ByteBuffer>;
   using Answer = absl::StatusOr<grpc::ByteBuffer> (*)(grpc::ByteBuffer&, const CallTools&);
 
-  void add_unary(const char* name, Answer answer);
-  void add_stream(const char* name, Answer answer);
-  grpc::Status unary(Answer answer, grpc::ServerContext& context, grpc::ByteBuffer& request,
-                     grpc::ByteBuffer& response);
-  grpc::Status stream(Answer answer, grpc::ServerContext& context, Stream& stream);
+  enum class Messages { one, many };
+
+  void add(const char* name, Answer answer, Messages messages);
+  grpc::Status answer_one(Answer answer, grpc::ServerContext& context, Stream& stream);
+  grpc::Status answer_many(Answer answer, grpc::ServerContext& context, Stream& stream);
   grpc::Status info(v1::InfoResponse& response);
   grpc::Status benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
                          grpc::ServerWriter<v1::BenchmarkProgress>& writer);

@@ -3,25 +3,25 @@
 #include <sys/stat.h>
 
 #include <cerrno>
-#include <condition_variable>
 #include <cstring>
 #include <mutex>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
-#include "grpc/grpc.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/resource_quota.h"
 #include "src/listen.h"
 #include "src/sampler_service.h"
+#include "wire/keep_grpc.h"
 
 namespace facetwise {
 namespace {
 
+constexpr std::chrono::milliseconds kPause{100};
 // Calls that are none of ours (a health watch, a reflection stream) have this long when ours are done.
-constexpr std::chrono::milliseconds kLinger{500};
+constexpr std::chrono::milliseconds kLinger{300};
 
 absl::Status check_options(const ServerOptions& options) {
   const auto invalid = [](absl::string_view what) { return absl::InvalidArgumentError(what); };
@@ -66,6 +66,7 @@ class GrpcServer final : public Server {
 };
 
 absl::Status GrpcServer::listen() {
+  wire::keep_grpc();
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
@@ -103,6 +104,9 @@ absl::Status GrpcServer::listen() {
     if (ports[k] <= 0)
       return absl::UnavailableError(
           absl::StrCat(address, ": cannot listen there: in use, not allowed, or not an address of this machine"));
+  }
+  for (std::size_t k = 0; k < ports.size(); ++k) {
+    const std::string& address = options_.listen[k];
     const std::string path = unix_path(address);
     if (!path.empty() && chmod(path.c_str(), options_.unix_mode) != 0)
       return absl::UnavailableError(absl::StrCat(address, ": cannot set its permissions: ", std::strerror(errno)));
@@ -120,23 +124,13 @@ void GrpcServer::drain() {
   const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
   server_->GetHealthCheckService()->SetServingStatus(false);
   service_.admission().close();
-  // Refuses connections and new calls at once, then waits for all calls, health watches as well.
-  std::thread shutdown([&] { server_->Shutdown(std::chrono::system_clock::now() + options_.drain_timeout); });
+  // gRPC's own shutdown would drop calls whose requests are on their way, so until ours are done it goes on
+  // and new calls are refused one by one. The pause is for those that have just arrived.
   service_.admission().wait_until_idle(until);
-  std::mutex mutex;
-  std::condition_variable done;
-  bool ended = false;
-  std::thread ender([&] {
-    std::unique_lock wait(mutex);
-    if (!done.wait_for(wait, kLinger, [&] { return ended; })) grpc_server_cancel_all_calls(server_->c_server());
-  });
-  shutdown.join();
-  {
-    const std::lock_guard end(mutex);
-    ended = true;
-  }
-  done.notify_all();
-  ender.join();
+  std::this_thread::sleep_for(kPause);
+  service_.admission().wait_until_idle(until);
+  const bool idle = service_.admission().calls() == 0;
+  server_->Shutdown(std::chrono::system_clock::now() + (idle ? kLinger : std::chrono::milliseconds(0)));
   sockets_.clear();
 }
 

@@ -1,0 +1,12 @@
+#include "wire/keep_grpc.h"
+
+#include "grpc/grpc.h"
+
+namespace facetwise::wire {
+
+void keep_grpc() {
+  static const bool kept = (grpc_init(), true);
+  (void)kept;
+}
+
+}  // namespace facetwise::wire
