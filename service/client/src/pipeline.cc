@@ -29,6 +29,7 @@ class Sender {
         load_(connections.size()) {}
 
   absl::Status run() {
+    if (auto status = wait_for_connections(); !status.ok()) return status;
     for (Call& call : calls_) start(call);
     absl::Status error;
     while (in_flight_ > 0) {
@@ -53,6 +54,18 @@ class Sender {
   }
 
  private:
+  // Calls on a connection that was lost would fail before it is made again.
+  absl::Status wait_for_connections() const {
+    const auto until = std::chrono::system_clock::now() + options_.connect_timeout;
+    for (const Connection& connection : connections_) {
+      if (connection.channel->GetState(true) == GRPC_CHANNEL_READY || connection.channel->WaitForConnected(until))
+        continue;
+      return absl::UnavailableError(absl::StrCat("server ", connection.address, ": no connection within ",
+                                                 options_.connect_timeout.count(), " ms: has it ended?"));
+    }
+    return absl::OkStatus();
+  }
+
   // The connection with the fewest calls in flight, in turn among those.
   std::size_t pick_connection() {
     std::size_t best = turn_;

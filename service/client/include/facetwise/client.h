@@ -19,8 +19,9 @@ struct ConnectOptions {
   std::size_t piece_bytes = std::size_t{1} << 20;
   // Pieces in flight at once, over all servers.
   int window = 4;
-  // How long connect() waits for a server, and a piece for its answer.
+  // How long connect(), or a call that has lost its server, waits for it (to come back).
   std::chrono::milliseconds connect_timeout{5000};
+  // How long a piece waits for its answer.
   std::chrono::milliseconds call_timeout{60000};
 };
 
