@@ -37,7 +37,8 @@ class List {
 };
 
 // Operations with the samplers they take.
-std::vector<Case> operations(std::span<const Sampler> query_samplers, std::span<const Sampler> normal_samplers) {
+std::vector<Case> operations(std::span<const Sampler> query_samplers,
+                             std::span<const Sampler> normal_samplers) {
   std::vector<Case> cases;
   for (const Sampler sampler : normal_samplers)
     cases.push_back({.operation = Operation::sample_normal, .sampler = sampler});
@@ -53,7 +54,8 @@ std::vector<Case> operations(std::span<const Sampler> query_samplers, std::span<
 std::vector<Case> quick_cases() {
   List list;
   for (const Sampler sampler : all_samplers()) list.add({.sampler = sampler});
-  for (const Sampler sampler : kReflectionSamplers) list.add({.sampler = sampler, .alpha_x = 0.8f, .alpha_y = 0.1f});
+  for (const Sampler sampler : kReflectionSamplers)
+    list.add({.sampler = sampler, .alpha_x = 0.8f, .alpha_y = 0.1f});
   return list.take();
 }
 
@@ -77,9 +79,11 @@ std::vector<Case> all_cases() {
   constexpr Sampler kNormals[] = {Sampler::ndf, Sampler::heitz, Sampler::cap};
   for (const std::size_t batch : kBatches) {
     for (const auto& [alpha_x, alpha_y] : kAlphas) {
-      for (const Inputs inputs : {Inputs::columns, Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
+      for (const Inputs inputs :
+           {Inputs::columns, Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
         for (const Sampler sampler : all_samplers())
-          list.add({.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
+          list.add(
+              {.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
       for (Case which : operations(all_samplers(), kNormals)) {
         which.alpha_x = alpha_x;
         which.alpha_y = alpha_y;
@@ -95,21 +99,30 @@ std::vector<Case> all_cases() {
 
 std::string_view name(Implementation implementation) {
   switch (implementation) {
-    case Implementation::scalar: return "scalar";
-    case Implementation::one_lane: return "one-lane";
-    case Implementation::simd: return "simd";
-    case Implementation::simd_threads: return "simd-threads";
-    case Implementation::remote: return "remote";
+    case Implementation::scalar:
+      return "scalar";
+    case Implementation::one_lane:
+      return "one-lane";
+    case Implementation::simd:
+      return "simd";
+    case Implementation::simd_threads:
+      return "simd-threads";
+    case Implementation::remote:
+      return "remote";
   }
   return "";
 }
 
 std::string_view name(Inputs inputs) {
   switch (inputs) {
-    case Inputs::columns: return "columns";
-    case Inputs::one_roughness: return "one-roughness";
-    case Inputs::generator: return "generator";
-    case Inputs::backfacing: return "backfacing";
+    case Inputs::columns:
+      return "columns";
+    case Inputs::one_roughness:
+      return "one-roughness";
+    case Inputs::generator:
+      return "generator";
+    case Inputs::backfacing:
+      return "backfacing";
   }
   return "";
 }
@@ -187,11 +200,21 @@ int flops(const Case& which) {
   if (which.is_sampling()) {
     int draw = 0;
     switch (*which.sampler) {
-      case Sampler::ndf: draw = 26; break;
-      case Sampler::heitz: draw = 56; break;
-      case Sampler::cap: draw = 31; break;
-      case Sampler::bounded: draw = 31 + kBound; break;
-      case Sampler::exact: draw = cone + (isotropic ? 60 : 62); break;
+      case Sampler::ndf:
+        draw = 26;
+        break;
+      case Sampler::heitz:
+        draw = 56;
+        break;
+      case Sampler::cap:
+        draw = 31;
+        break;
+      case Sampler::bounded:
+        draw = 31 + kBound;
+        break;
+      case Sampler::exact:
+        draw = cone + (isotropic ? 60 : 62);
+        break;
     }
     const int normal = which.operation == Operation::sample_normal ? 8 : 0;
     return kLength + kPrepare + kSinCos + draw + kReflect + normal;
@@ -201,11 +224,19 @@ int flops(const Case& which) {
   if (which.operation != Operation::pdf_reflection) sum += kShadowing;
   if (which.operation != Operation::evaluate_reflection) {
     switch (*which.sampler) {
-      case Sampler::ndf: sum += 5; break;
+      case Sampler::ndf:
+        sum += 5;
+        break;
       case Sampler::heitz:
-      case Sampler::cap: sum += 2; break;
-      case Sampler::bounded: sum += 2 + kBound; break;
-      case Sampler::exact: sum += 1 + cone; break;
+      case Sampler::cap:
+        sum += 2;
+        break;
+      case Sampler::bounded:
+        sum += 2 + kBound;
+        break;
+      case Sampler::exact:
+        sum += 1 + cone;
+        break;
     }
   }
   return sum;

@@ -45,8 +45,8 @@ BenchResult describe(const Case& which);
 absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options);
 
 // Floating-point operations of a lane with i_z > 0 that ends up accepted, counted by hand from the kernels'
-// formulas: + - * / and sqrt are one, a fused multiply-add two; comparisons, selects, integers (random numbers)
-// and conversions are none.
+// formulas: + - * / and sqrt are one, a fused multiply-add two; comparisons, selects, integers (random
+// numbers) and conversions are none.
 int flops(const Case& which);
 
 }  // namespace facetwise::bench

@@ -36,7 +36,8 @@ std::uint64_t available_memory() {
 absl::StatusOr<Columns> Columns::make(std::size_t lanes) {
   Columns columns;
   columns.lanes_ = lanes;
-  // Five cache lines between columns, so that the same lane of two columns is never at the same place of a page.
+  // Five cache lines between columns, so that the same lane of two columns is never at the same place of a
+  // page.
   columns.stride_ = (lanes + 15) / 16 * 16 + 80;
   const std::uint64_t bytes = (kInputs + kOutputs) * columns.stride_ * sizeof(float);
   if (bytes > available_memory() / 10 * 9)
@@ -71,8 +72,7 @@ absl::Status Columns::set_roughness(float alpha_x, float alpha_y, std::size_t la
   if (queries && query_lanes_ < lanes) {
     Batch sampling = batch({.sampler = Sampler::cap, .batch = lanes});
     sampling.out = {};
-    sampling.out.outgoing = {
-        {input(kOx), lanes}, {input(kOy), lanes}, {input(kOz), lanes}};
+    sampling.out.outgoing = {{input(kOx), lanes}, {input(kOy), lanes}, {input(kOz), lanes}};
     if (auto sampled = sample_reflection(sampling); !sampled.ok()) return sampled.status();
     query_lanes_ = lanes;
   }
@@ -123,13 +123,19 @@ Batch Columns::batch(const Case& which) const {
       batch.out.outgoing = {out(0), out(1), out(2)};
       batch.out.pdf = out(3);
       break;
-    case Operation::pdf_reflection: batch.out.pdf = out(0); break;
-    case Operation::evaluate_reflection: batch.out.value = out(0); break;
+    case Operation::pdf_reflection:
+      batch.out.pdf = out(0);
+      break;
+    case Operation::evaluate_reflection:
+      batch.out.value = out(0);
+      break;
     case Operation::evaluate_and_pdf:
       batch.out.value = out(0);
       batch.out.pdf = out(1);
       break;
-    case Operation::masking: batch.out.masking = out(0); break;
+    case Operation::masking:
+      batch.out.masking = out(0);
+      break;
   }
   return batch;
 }

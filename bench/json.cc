@@ -29,13 +29,13 @@ Json to_json(const BenchResult& r) {
       {"name", r.name()},
       {"inputs", r.inputs},
       {"threads", r.threads},
-      {"ns_per_sample_min", r.ns_per_sample_min},
-      {"repetitions", r.repetitions},
       {"ns_per_accepted", finite(r.ns_per_accepted())},
-      {"bytes_per_second", r.bytes_per_second()},
       {"share_occluded", r.share_occluded()},
   };
   // Left out where they were not measured.
+  if (r.bytes_per_sample > 0) json["bytes_per_second"] = r.bytes_per_second();
+  if (r.repetitions > 0) json["repetitions"] = r.repetitions;
+  if (r.ns_per_sample_min > 0) json["ns_per_sample_min"] = r.ns_per_sample_min;
   if (r.share_of_copy > 0) json["share_of_copy"] = r.share_of_copy;
   if (r.share_of_fma > 0) json["share_of_fma"] = r.share_of_fma;
   return json;

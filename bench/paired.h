@@ -1,5 +1,6 @@
-// Ratios of times that hold on a noisy machine: both are measured in turn, A B A B, and the median of the
-// rounds' ratios is taken.
+// Ratios of times that hold on a noisy machine: both are measured in turn, A B B A, and the median of the
+// rounds' ratios is taken. Rounds are short, so that what disturbs them seldom hits one side alone, and their
+// order turns, so that nothing periodic always hits the same one.
 #pragma once
 
 #include <algorithm>
@@ -42,8 +43,9 @@ Paired measure_paired(const A& a, const B& b, int rounds, double seconds) {
   const int calls_a = calls_for<Clock>(a, seconds), calls_b = calls_for<Clock>(b, seconds);
   std::vector<double> times_a, times_b, ratios;
   for (int round = 0; round < rounds; ++round) {
-    times_a.push_back(time_calls<Clock>(a, calls_a));
+    if (round % 2 == 0) times_a.push_back(time_calls<Clock>(a, calls_a));
     times_b.push_back(time_calls<Clock>(b, calls_b));
+    if (round % 2 != 0) times_a.push_back(time_calls<Clock>(a, calls_a));
     ratios.push_back(times_a.back() / times_b.back());
   }
   return {median_of(times_a), median_of(times_b), median_of(ratios)};

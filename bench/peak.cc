@@ -3,7 +3,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bench/peak.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
-
 #include "hwy/highway.h"
 
 #ifndef FACETWISE_BENCH_PEAK_TABLE_
@@ -25,7 +24,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 std::uint64_t MultiplyAdd(std::uint64_t rounds, float& sink) {
   const hn::ScalableTag<float> d;
   const auto scale = hn::Set(d, 0.999f), offset = hn::Set(d, 0.001f);
-  // Twelve chains cover the latency of four cycles on two units, and fit into 16 registers with the constants.
+  // Twelve chains cover the latency of four cycles on two units, and fit into 16 registers with the
+  // constants.
   auto a = hn::Set(d, 0.1f), b = hn::Set(d, 0.2f), c = hn::Set(d, 0.3f), e = hn::Set(d, 0.4f);
   auto f = hn::Set(d, 0.5f), g = hn::Set(d, 0.6f), h = hn::Set(d, 0.7f), i = hn::Set(d, 0.8f);
   auto j = hn::Set(d, 0.9f), k = hn::Set(d, 1.1f), l = hn::Set(d, 1.2f), m = hn::Set(d, 1.3f);
@@ -113,15 +113,19 @@ namespace {
 const PeakTable& table(Target target) {
   switch (resolve(target).value_or(Target::scalar)) {
 #if HWY_TARGETS & HWY_AVX3
-    case Target::avx3: return N_AVX3::kPeakTable;
+    case Target::avx3:
+      return N_AVX3::kPeakTable;
 #endif
 #if HWY_TARGETS & HWY_AVX2
-    case Target::avx2: return N_AVX2::kPeakTable;
+    case Target::avx2:
+      return N_AVX2::kPeakTable;
 #endif
 #if HWY_TARGETS & HWY_NEON
-    case Target::neon: return N_NEON::kPeakTable;
+    case Target::neon:
+      return N_NEON::kPeakTable;
 #endif
-    default: return N_SCALAR::kPeakTable;
+    default:
+      return N_SCALAR::kPeakTable;
   }
 }
 

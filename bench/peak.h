@@ -9,8 +9,8 @@
 
 namespace facetwise::bench {
 
-// Does `rounds` rounds of independent chains of fused multiply-adds; returns the floating-point operations done
-// (a fused multiply-add is two). `sink` receives the chains' sum, so that nothing is left out.
+// Does `rounds` rounds of independent chains of fused multiply-adds; returns the floating-point operations
+// done (a fused multiply-add is two). `sink` receives the chains' sum, so that nothing is left out.
 std::uint64_t multiply_add(Target target, std::uint64_t rounds, float& sink);
 
 // The most columns of copy_columns().

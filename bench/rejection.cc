@@ -13,8 +13,9 @@ constexpr double kPi = std::numbers::pi;
 reference::Vector incident(double theta) { return {std::sin(theta), 0, std::cos(theta)}; }
 
 // One configuration's count. `stream` sets its random numbers apart from the others'.
-absl::Status count(const std::string& experiment, Sampler sampler, double alpha_x, double alpha_y, double theta,
-                   std::size_t samples, std::uint32_t stream, Target target, std::vector<RejectionResult>& results) {
+absl::Status count(const std::string& experiment, Sampler sampler, double alpha_x, double alpha_y,
+                   double theta, std::size_t samples, std::uint32_t stream, Target target,
+                   std::vector<RejectionResult>& results) {
   const reference::Vector i = incident(theta);
   Batch batch;
   batch.sampler = sampler;
@@ -48,8 +49,8 @@ constexpr double kSweepTheta[] = {0, 15, 30, 45, 60, 75, 85, 89, 100, 135};
 constexpr std::pair<double, double> kSweepAlpha[] = {{.01, .01}, {.1, .1}, {.3, .3}, {.5, .5},
                                                      {1, 1},     {2, 2},   {.8, .1}, {.3, 1}};
 
-// The post gives neither roughness nor the number of samples; these two fit its counts at 1.5 rad (371 by normals'
-// density, 61 by visible normals) best.
+// The post gives neither roughness nor the number of samples; these two fit its counts at 1.5 rad (371 by
+// normals' density, 61 by visible normals) best.
 struct Post {
   double alpha;
   std::size_t samples;
@@ -70,8 +71,8 @@ double ndf_share_occluded(double alpha_x, double alpha_y, double theta) {
     // M = (t ex, t ey, 1): i.M = b t + i_z.
     const double b = ex * i.x + ey * i.y;
     if (i.z > 0) {
-      // o_z > 0 where 2 (i.M) > i_z M.M, that is a t^2 - 2 b t - i_z < 0 with a = i_z (ex^2 + ey^2). The larger
-      // root, without cancellation; i.M > 0 follows.
+      // o_z > 0 where 2 (i.M) > i_z M.M, that is a t^2 - 2 b t - i_z < 0 with a = i_z (ex^2 + ey^2). The
+      // larger root, without cancellation; i.M > 0 follows.
       const double a = i.z * (ex * ex + ey * ey);
       const double root = std::sqrt(b * b + a * i.z);
       const double t = b > 0 ? (b + root) / a : i.z / (root - b);
@@ -104,13 +105,15 @@ absl::Status count_rejections(std::size_t samples, Target target, const std::fun
   const auto all_at = [&](const char* experiment, double alpha_x, double alpha_y, double theta,
                           std::size_t lanes) -> absl::Status {
     for (const Sampler sampler : all_samplers())
-      if (const auto status = count(experiment, sampler, alpha_x, alpha_y, theta, lanes, stream++, target, results);
+      if (const auto status =
+              count(experiment, sampler, alpha_x, alpha_y, theta, lanes, stream++, target, results);
           !status.ok())
         return status;
     return step() ? absl::OkStatus() : absl::CancelledError("the benchmarks were stopped");
   };
   for (const auto& [theta, alpha_x, alpha_y] : kTable)
-    if (const auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok()) return status;
+    if (const auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())
+      return status;
   for (const auto& [alpha_x, alpha_y] : kSweepAlpha)
     for (const double theta : kSweepTheta)
       if (const auto status = all_at("sweep", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())

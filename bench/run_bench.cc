@@ -27,7 +27,8 @@ using namespace bench;
 
 absl::Status check_options(const BenchOptions& options) {
   if (!(options.min_seconds > 0 && options.min_seconds <= 10))
-    return absl::InvalidArgumentError(absl::StrCat("min_seconds: ", options.min_seconds, " is not in (0, 10]"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("min_seconds: ", options.min_seconds, " is not in (0, 10]"));
   if (options.threads < 0 || options.threads > 4096)
     return absl::InvalidArgumentError(absl::StrCat("threads: ", options.threads, " is not in [0, 4096]"));
   if (!resolve(options.target)) {
@@ -38,8 +39,8 @@ absl::Status check_options(const BenchOptions& options) {
   return absl::OkStatus();
 }
 
-absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cases, const BenchCallback& progress,
-                       BenchReport& report) {
+absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cases,
+                       const BenchCallback& progress, BenchReport& report) {
   BenchProgress now{.done = 0, .total = cases.size(), .result = nullptr, .part = "limits"};
   const std::function<bool()> step = [&] { return !progress || progress(now); };
   const auto stopped = [] { return absl::CancelledError("the benchmarks were stopped"); };
@@ -49,7 +50,8 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
   if (options.limits) {
     if (!step()) return stopped();
     report.limits.fma.push_back(measure_fma(*resolve(options.target), 1));
-    if (report.threads > 1) report.limits.fma.push_back(measure_fma(*resolve(options.target), report.threads));
+    if (report.threads > 1)
+      report.limits.fma.push_back(measure_fma(*resolve(options.target), report.threads));
   }
 
   std::size_t lanes = 0;
@@ -66,7 +68,8 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
     now.result = nullptr;
     return go_on;
   };
-  if (const auto status = measure_throughput(options, cases, *columns, done, report); !status.ok()) return status;
+  if (const auto status = measure_throughput(options, cases, *columns, done, report); !status.ok())
+    return status;
 
   if (targets) {
     now.part = "targets";
@@ -88,7 +91,8 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
 absl::StatusOr<BenchReport> run_bench(const BenchOptions& options, const BenchCallback& progress) {
   static std::mutex one_run;
   const std::unique_lock lock(one_run, std::try_to_lock);
-  if (!lock) return absl::FailedPreconditionError("another benchmark is under way in this process: try again later");
+  if (!lock)
+    return absl::FailedPreconditionError("another benchmark is under way in this process: try again later");
   if (const auto status = check_options(options); !status.ok()) return status;
   const auto cases = choose_cases(options);
   if (!cases.ok()) return cases.status();

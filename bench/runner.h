@@ -15,8 +15,8 @@ using Runner = std::function<absl::StatusOr<std::uint64_t>()>;
 // `columns` has the case's roughness set and outlives the runner. `remote` is for remote cases alone.
 Runner make_runner(const Case& which, const Columns& columns, Target target, Engine* remote);
 
-// The baseline in a plain loop over the batch's columns: returns how many lanes were occluded. The batch is one
-// of Columns::batch().
+// The baseline in a plain loop over the batch's columns: returns how many lanes were occluded. The batch is
+// one of Columns::batch().
 std::uint64_t run_scalar(Operation operation, const Batch& batch);
 
 }  // namespace facetwise::bench

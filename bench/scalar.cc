@@ -1,5 +1,5 @@
-// The baseline's loops. The sampler is a template argument, as it would be fixed in a renderer's loop, and what
-// the loop has no use for (the weight) is not computed.
+// The baseline's loops. The sampler is a template argument, as it would be fixed in a renderer's loop, and
+// what the loop has no use for (the weight) is not computed.
 #include "facetwise/baseline.h"
 #include "runner.h"
 
@@ -49,7 +49,8 @@ template <Sampler sampler>
 std::uint64_t sample_reflections(const Batch& batch) {
   const Inputs in(batch);
   const In u1(batch.u1), u2(batch.u2), u3(sampler == Sampler::exact ? batch.u3 : batch.u2);
-  float *ox = batch.out.outgoing.x.data(), *oy = batch.out.outgoing.y.data(), *oz = batch.out.outgoing.z.data();
+  float *ox = batch.out.outgoing.x.data(), *oy = batch.out.outgoing.y.data(),
+        *oz = batch.out.outgoing.z.data();
   float* pdf = batch.out.pdf.data();
   std::uint64_t occluded = 0;
   for (std::size_t lane = 0; lane < in.lanes; ++lane) {
@@ -92,12 +93,18 @@ std::uint64_t mask(const Batch& batch) {
 template <Sampler sampler>
 std::uint64_t run_sampler(Operation operation, const Batch& batch) {
   switch (operation) {
-    case Operation::sample_normal: return sample_normals<sampler>(batch);
-    case Operation::sample_reflection: return sample_reflections<sampler>(batch);
-    case Operation::pdf_reflection: return query<sampler, false, true>(batch);
-    case Operation::evaluate_reflection: return query<sampler, true, false>(batch);
-    case Operation::evaluate_and_pdf: return query<sampler, true, true>(batch);
-    case Operation::masking: return mask(batch);
+    case Operation::sample_normal:
+      return sample_normals<sampler>(batch);
+    case Operation::sample_reflection:
+      return sample_reflections<sampler>(batch);
+    case Operation::pdf_reflection:
+      return query<sampler, false, true>(batch);
+    case Operation::evaluate_reflection:
+      return query<sampler, true, false>(batch);
+    case Operation::evaluate_and_pdf:
+      return query<sampler, true, true>(batch);
+    case Operation::masking:
+      return mask(batch);
   }
   return 0;
 }
@@ -106,11 +113,16 @@ std::uint64_t run_sampler(Operation operation, const Batch& batch) {
 
 std::uint64_t run_scalar(Operation operation, const Batch& batch) {
   switch (batch.sampler) {
-    case Sampler::ndf: return run_sampler<Sampler::ndf>(operation, batch);
-    case Sampler::heitz: return run_sampler<Sampler::heitz>(operation, batch);
-    case Sampler::cap: return run_sampler<Sampler::cap>(operation, batch);
-    case Sampler::bounded: return run_sampler<Sampler::bounded>(operation, batch);
-    case Sampler::exact: return run_sampler<Sampler::exact>(operation, batch);
+    case Sampler::ndf:
+      return run_sampler<Sampler::ndf>(operation, batch);
+    case Sampler::heitz:
+      return run_sampler<Sampler::heitz>(operation, batch);
+    case Sampler::cap:
+      return run_sampler<Sampler::cap>(operation, batch);
+    case Sampler::bounded:
+      return run_sampler<Sampler::bounded>(operation, batch);
+    case Sampler::exact:
+      return run_sampler<Sampler::exact>(operation, batch);
   }
   return 0;
 }

@@ -15,8 +15,8 @@ namespace facetwise::bench {
 namespace {
 
 constexpr std::size_t kBatch = 65536;
-constexpr int kRounds = 25;
-constexpr double kRound = 0.004;  // seconds that each side of a pair runs per round
+constexpr int kRounds = 61;
+constexpr double kRound = 0.001;  // seconds that each side of a pair runs per round
 
 struct Roughness {
   float x, y;
@@ -41,7 +41,8 @@ std::string alpha_text(Roughness alpha) { return fmt::format("({:g}, {:g})", alp
 
 class Measuring {
  public:
-  Measuring(const BenchOptions& options, Columns& columns, const std::function<bool()>& step, BenchReport& report)
+  Measuring(const BenchOptions& options, Columns& columns, const std::function<bool()>& step,
+            BenchReport& report)
       : options_(options), columns_(columns), step_(step), report_(report) {}
 
   absl::Status run() {
@@ -80,7 +81,9 @@ class Measuring {
     return status_.ok();
   }
 
-  Timed timed(const Case& which, Target target) { return {which, columns_, target, options_.remote, status_}; }
+  Timed timed(const Case& which, Target target) {
+    return {which, columns_, target, options_.remote, status_};
+  }
 
   void roughness(Roughness alpha, std::size_t lanes) {
     status_.Update(columns_.set_roughness(alpha.x, alpha.y, lanes, false));
@@ -98,11 +101,12 @@ class Measuring {
                      .note = "smallest of"};
     for (const Roughness alpha : kAlphas) {
       roughness(alpha, kBatch);
-      const Paired pair = measure_paired(timed(sampling(Sampler::bounded, Implementation::scalar), target),
-                                         timed(sampling(Sampler::bounded, Implementation::simd), target), kRounds, kRound);
+      const Paired pair =
+          measure_paired(timed(sampling(Sampler::bounded, Implementation::scalar), target),
+                         timed(sampling(Sampler::bounded, Implementation::simd), target), kRounds, kRound);
       row.measured = std::min(row.measured.value_or(pair.ratio), pair.ratio);
-      row.note += fmt::format(" {:.1f} at {}: {:.2f} over {:.3f} ns;", pair.ratio, alpha_text(alpha), 1e9 * pair.a / kBatch,
-                              1e9 * pair.b / kBatch);
+      row.note += fmt::format(" {:.1f} at {}: {:.2f} over {:.3f} ns;", pair.ratio, alpha_text(alpha),
+                              1e9 * pair.a / kBatch, 1e9 * pair.b / kBatch);
     }
     row.note.pop_back();
     report_.targets.push_back(row);
@@ -116,8 +120,9 @@ class Measuring {
                      .unit = "x",
                      .note = "largest of"};
     const auto measure = [&](const std::string& where) {
-      const Paired pair = measure_paired(timed(sampling(Sampler::exact, Implementation::simd), target),
-                                         timed(sampling(Sampler::bounded, Implementation::simd), target), kRounds, kRound);
+      const Paired pair =
+          measure_paired(timed(sampling(Sampler::exact, Implementation::simd), target),
+                         timed(sampling(Sampler::bounded, Implementation::simd), target), kRounds, kRound);
       row.measured = std::max(row.measured.value_or(pair.ratio), pair.ratio);
       row.note += fmt::format(" {:.2f} {};", pair.ratio, where);
     };
@@ -147,15 +152,16 @@ class Measuring {
 
   void small_batch(Sampler sampler) {
     roughness(kAlphas[0], kBatch);
-    const Paired pair =
-        measure_paired(timed(sampling(sampler, Implementation::simd), options_.target),
-                       timed(sampling(sampler, Implementation::simd, 1000), options_.target), kRounds, kRound);
+    const Paired pair = measure_paired(timed(sampling(sampler, Implementation::simd), options_.target),
+                                       timed(sampling(sampler, Implementation::simd, 1000), options_.target),
+                                       kRounds, kRound);
     const double measured = pair.ratio * 1000 / kBatch;
-    report_.targets.push_back({.what = fmt::format("{}: rate of 1,000 lanes over that of 64 k", name(sampler)),
-                               .required = 0.85,
-                               .measured = measured,
-                               .unit = "x",
-                               .note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.b / 1000, 1e9 * pair.a / kBatch)});
+    report_.targets.push_back(
+        {.what = fmt::format("{}: rate of 1,000 lanes over that of 64 k", name(sampler)),
+         .required = 0.85,
+         .measured = measured,
+         .unit = "x",
+         .note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.b / 1000, 1e9 * pair.a / kBatch)});
   }
 
   void large_batch(Sampler sampler) {
@@ -172,9 +178,11 @@ class Measuring {
     }
     roughness(kAlphas[0], kTargetLanes);
     const Case large = sampling(sampler, Implementation::simd, kTargetLanes);
-    const Timed sample = timed(large, options_.target), in_cache = timed(sampling(sampler, Implementation::simd), options_.target);
+    const Timed sample = timed(large, options_.target),
+                in_cache = timed(sampling(sampler, Implementation::simd), options_.target);
     const auto copy = [&](CopyOrder order) {
-      return make_copy(columns_, large.input_columns(), large.output_columns(), kTargetLanes, options_.target, false, order);
+      return make_copy(columns_, large.input_columns(), large.output_columns(), kTargetLanes, options_.target,
+                       false, order);
     };
     const auto one_by_one = copy(CopyOrder::one_by_one), side_by_side = copy(CopyOrder::side_by_side);
     const int in_cache_calls = calls_for(in_cache, kRound);
@@ -205,8 +213,9 @@ class Measuring {
       roughness(kAlphas[0], kBatch);
       tbb::task_arena two(2);
       const Timed both = timed(sampling(sampler, Implementation::simd_threads), options_.target);
-      const Paired pair = measure_paired(timed(sampling(sampler, Implementation::simd), options_.target),
-                                         [&] { two.execute([&] { both(); }); }, kRounds, kRound);
+      const Paired pair = measure_paired(
+          timed(sampling(sampler, Implementation::simd), options_.target),
+          [&] { two.execute([&] { both(); }); }, kRounds, kRound);
       row.measured = pair.ratio;
       row.note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.a / kBatch, 1e9 * pair.b / kBatch);
     }
@@ -225,12 +234,14 @@ class Measuring {
       roughness(kAlphas[0], std::size_t{1} << 20);
       const Timed local = timed(sampling(Sampler::bounded, Implementation::simd), options_.target);
       const Timed far = timed(sampling(Sampler::bounded, Implementation::remote), options_.target);
-      const Timed far_large = timed(sampling(Sampler::bounded, Implementation::remote, std::size_t{1} << 20), options_.target);
-      const Paired pair = measure_paired(far, local, kRounds, 0.02);
-      const double large = measure_paired(far_large, local, kRounds, 0.02).a;
+      const Timed far_large =
+          timed(sampling(Sampler::bounded, Implementation::remote, std::size_t{1} << 20), options_.target);
+      constexpr int kFarRounds = 15;
+      const Paired pair = measure_paired(far, local, kFarRounds, 0.02);
+      const double large = measure_paired(far_large, local, kFarRounds, 0.02).a;
       row.measured = kBatch / pair.a / 1e6;
-      row.note = fmt::format("batches of 64 k; of 1 M: {:.1f}; local, one thread: {:.0f}", (1 << 20) / large / 1e6,
-                             kBatch / pair.b / 1e6);
+      row.note = fmt::format("batches of 64 k; of 1 M: {:.1f}; local, one thread: {:.0f}",
+                             (1 << 20) / large / 1e6, kBatch / pair.b / 1e6);
     }
     report_.targets.push_back(row);
   }

@@ -62,18 +62,20 @@ class Group {
 
   // `once` is timed. Its first error ends its benchmark and is the group's.
   void add(const std::string& name, std::function<absl::Status()> once) {
-    auto* registered = benchmark::RegisterBenchmark(name.c_str(), [this, once = std::move(once)](benchmark::State& state) {
-      for (auto _ : state) {
-        if (const absl::Status status = once(); !status.ok()) {
-          status_.Update(status);
-          state.SkipWithError(std::string(status.message()).c_str());
-          break;
-        }
-      }
-    });
+    auto* registered =
+        benchmark::RegisterBenchmark(name.c_str(), [this, once = std::move(once)](benchmark::State& state) {
+          for (auto _ : state) {
+            if (const absl::Status status = once(); !status.ok()) {
+              status_.Update(status);
+              state.SkipWithError(std::string(status.message()).c_str());
+              break;
+            }
+          }
+        });
     registered->UseRealTime();
     const double repetitions = repetitions_;
-    if (!flag_is_set(options_.benchmark_flags, "benchmark_repetitions")) registered->Repetitions(repetitions_);
+    if (!flag_is_set(options_.benchmark_flags, "benchmark_repetitions"))
+      registered->Repetitions(repetitions_);
     if (!flag_is_set(options_.benchmark_flags, "benchmark_min_time"))
       registered->MinTime(options_.min_seconds / repetitions);
   }
@@ -91,14 +93,15 @@ class Group {
 
 const CopyLimit* find_copy(const BenchLimits& limits, const Case& which, int threads) {
   for (const CopyLimit& copy : limits.copy)
-    if (copy.inputs == which.input_columns() && copy.outputs == which.output_columns() && copy.batch == which.batch &&
-        copy.threads == threads)
+    if (copy.inputs == which.input_columns() && copy.outputs == which.output_columns() &&
+        copy.batch == which.batch && copy.threads == threads)
       return &copy;
   return nullptr;
 }
 
 std::string copy_name(bool all_threads, CopyOrder order) {
-  return absl::StrCat("copy/", all_threads ? "threads" : "thread", order == CopyOrder::one_by_one ? "/1" : "/2");
+  return absl::StrCat("copy/", all_threads ? "threads" : "thread",
+                      order == CopyOrder::one_by_one ? "/1" : "/2");
 }
 constexpr CopyOrder kOrders[] = {CopyOrder::one_by_one, CopyOrder::side_by_side};
 
@@ -114,9 +117,12 @@ double copy_time(Times& times, bool all_threads) {
 
 int threads_of(Implementation implementation, int all) {
   switch (implementation) {
-    case Implementation::remote: return 0;
-    case Implementation::simd_threads: return all;
-    default: return 1;
+    case Implementation::remote:
+      return 0;
+    case Implementation::simd_threads:
+      return all;
+    default:
+      return 1;
   }
 }
 
@@ -142,10 +148,11 @@ absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
       return absl::StartsWith(flag, absl::StrCat("--", name, "="));
     });
     if (!taken)
-      return absl::InvalidArgumentError(absl::StrCat(
-          "benchmark flag \"", flag, "\": of Google Benchmark's flags, those that change how a measurement runs ",
-          "are taken: --benchmark_repetitions=N, --benchmark_min_time=SECONDS, ",
-          "--benchmark_enable_random_interleaving=BOOL, --v=LEVEL"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("benchmark flag \"", flag,
+                       "\": of Google Benchmark's flags, those that change how a measurement runs ",
+                       "are taken: --benchmark_repetitions=N, --benchmark_min_time=SECONDS, ",
+                       "--benchmark_enable_random_interleaving=BOOL, --v=LEVEL"));
     storage.push_back(flag);
   }
   std::vector<char*> argv;
@@ -154,29 +161,34 @@ absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
   argv.push_back(nullptr);
   benchmark::Initialize(&argc, argv.data());
   // It leaves what it cannot parse.
-  if (argc > 1) return absl::InvalidArgumentError(absl::StrCat("benchmark flag \"", argv[1], "\": not a value that fits"));
+  if (argc > 1)
+    return absl::InvalidArgumentError(
+        absl::StrCat("benchmark flag \"", argv[1], "\": not a value that fits"));
   return absl::OkStatus();
 }
 
 absl::Status measure_throughput(const BenchOptions& options, const std::vector<Case>& cases, Columns& columns,
                                 const std::function<bool(const BenchResult&)>& done, BenchReport& report) {
   for (auto first = cases.begin(); first != cases.end();) {
-    const auto last = std::find_if_not(first, cases.end(), [&](const Case& which) { return which.comparable(*first); });
+    const auto last =
+        std::find_if_not(first, cases.end(), [&](const Case& which) { return which.comparable(*first); });
     const bool queries = !first->is_sampling() && first->operation != Operation::masking;
-    if (const auto status = columns.set_roughness(first->alpha_x, first->alpha_y, first->batch, queries); !status.ok())
+    if (const auto status = columns.set_roughness(first->alpha_x, first->alpha_y, first->batch, queries);
+        !status.ok())
       return status;
 
     Group group(options, first->batch);
     std::vector<std::uint64_t> rejected(static_cast<std::size_t>(last - first));
     for (auto which = first; which != last; ++which) {
       std::uint64_t& count = rejected[static_cast<std::size_t>(which - first)];
-      group.add(std::string(name(which->implementation)),
-                [once = make_runner(*which, columns, options.target, options.remote), &count]() -> absl::Status {
-                  const auto occluded = once();
-                  if (!occluded.ok()) return occluded.status();
-                  count = *occluded;
-                  return absl::OkStatus();
-                });
+      group.add(
+          std::string(name(which->implementation)),
+          [once = make_runner(*which, columns, options.target, options.remote), &count]() -> absl::Status {
+            const auto occluded = once();
+            if (!occluded.ok()) return occluded.status();
+            count = *occluded;
+            return absl::OkStatus();
+          });
     }
     std::vector<bool> copies;  // of one thread, of all
     if (options.limits) {

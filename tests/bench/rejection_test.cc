@@ -16,14 +16,17 @@ constexpr double kDegree = std::numbers::pi / 180;
 TEST(Rejections, CountsMeetPredictions) {
   std::vector<RejectionResult> results;
   int steps = 0;
-  ASSERT_TRUE(count_rejections(300'000, Target::best, [&] { return ++steps > 0; }, results).ok());
+  ASSERT_TRUE(count_rejections(
+                  300'000, Target::best, [&] { return ++steps > 0; }, results)
+                  .ok());
   EXPECT_EQ(results.size(), static_cast<std::size_t>(steps) * all_samplers().size());
   EXPECT_GT(results.size(), 400u);
   double squares = 0;
   int random = 0;
   for (const RejectionResult& r : results) {
-    EXPECT_LT(std::abs(r.deviations()), 5) << r.sampler << " " << r.theta_degrees << " " << r.alpha_x << " " << r.alpha_y
-                                           << ": " << r.rejected << " of " << r.samples << ", " << r.predicted_share;
+    EXPECT_LT(std::abs(r.deviations()), 5)
+        << r.sampler << " " << r.theta_degrees << " " << r.alpha_x << " " << r.alpha_y << ": " << r.rejected
+        << " of " << r.samples << ", " << r.predicted_share;
     if (r.sampler == "exact") {
       EXPECT_EQ(r.rejected, 0u);
       EXPECT_EQ(r.predicted_share, 0);
@@ -43,10 +46,12 @@ TEST(Rejections, PredictionsAreThoseOfTheDocumentation) {
   struct Row {
     double theta, alpha_x, alpha_y, ndf, cap, bounded;
   };
-  for (const Row& row : {Row{0, 1, 1, .5, .5, 0}, Row{30, .5, .5, .2276, .1951, .0522},
-                         Row{60, .3, 1, .3850, .3014, .2684}, Row{60, .02, .9, .2575, .2569, .2567},
-                         Row{89, .5, .5, .4935, .0086, .0002}}) {
-    const auto share = [&](Sampler sampler) { return predicted_share(sampler, row.alpha_x, row.alpha_y, row.theta * kDegree); };
+  for (const Row& row :
+       {Row{0, 1, 1, .5, .5, 0}, Row{30, .5, .5, .2276, .1951, .0522}, Row{60, .3, 1, .3850, .3014, .2684},
+        Row{60, .02, .9, .2575, .2569, .2567}, Row{89, .5, .5, .4935, .0086, .0002}}) {
+    const auto share = [&](Sampler sampler) {
+      return predicted_share(sampler, row.alpha_x, row.alpha_y, row.theta * kDegree);
+    };
     EXPECT_NEAR(share(Sampler::ndf), row.ndf, 6e-5) << row.theta;
     EXPECT_NEAR(share(Sampler::cap), row.cap, 6e-5) << row.theta;
     EXPECT_EQ(share(Sampler::heitz), share(Sampler::cap));
@@ -61,14 +66,15 @@ TEST(Rejections, NdfQuadratureIsTheDefinition) {
     double theta, alpha_x, alpha_y;
   };
   constexpr int kGrid = 1000;
-  for (const Row& row : {Row{0, .7, .7}, Row{50, .4, .9}, Row{85, .2, .2}, Row{100, .3, .3}, Row{140, 1, .5}}) {
+  for (const Row& row :
+       {Row{0, .7, .7}, Row{50, .4, .9}, Row{85, .2, .2}, Row{100, .3, .3}, Row{140, 1, .5}}) {
     const double theta = row.theta * kDegree;
     const reference::Vector i{std::sin(theta), 0, std::cos(theta)};
     int occluded = 0;
     for (int a = 0; a < kGrid; ++a)
       for (int b = 0; b < kGrid; ++b)
-        occluded += reference::sample_reflection({}, Sampler::ndf, {row.alpha_x, row.alpha_y}, i, (a + .5) / kGrid,
-                                                 (b + .5) / kGrid, 0)
+        occluded += reference::sample_reflection({}, Sampler::ndf, {row.alpha_x, row.alpha_y}, i,
+                                                 (a + .5) / kGrid, (b + .5) / kGrid, 0)
                         .status == LaneStatus::occluded;
     EXPECT_NEAR(ndf_share_occluded(row.alpha_x, row.alpha_y, theta), occluded / 1e6, 1e-3) << row.theta;
   }
@@ -77,7 +83,8 @@ TEST(Rejections, NdfQuadratureIsTheDefinition) {
 TEST(Rejections, Stop) {
   std::vector<RejectionResult> results;
   int steps = 0;
-  const auto status = count_rejections(1000, Target::best, [&] { return ++steps < 3; }, results);
+  const auto status = count_rejections(
+      1000, Target::best, [&] { return ++steps < 3; }, results);
   EXPECT_EQ(status.code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(results.size(), 3 * all_samplers().size());
 }

@@ -60,7 +60,8 @@ TEST(RunBench, MeasuresWhatItIsAskedFor) {
   auto& cap = rejected["cap"];
   EXPECT_GT(cap["simd"], 400u);
   EXPECT_LT(cap["simd"], 900u);
-  for (const char* implementation : {"one-lane", "simd-threads", "remote"}) EXPECT_EQ(cap[implementation], cap["simd"]);
+  for (const char* implementation : {"one-lane", "simd-threads", "remote"})
+    EXPECT_EQ(cap[implementation], cap["simd"]);
   EXPECT_NEAR(static_cast<double>(cap["scalar"]), static_cast<double>(cap["simd"]), 3);
   for (const char* implementation : {"one-lane", "simd", "simd-threads", "remote"})
     EXPECT_EQ(rejected["exact"].at(implementation), 0u) << implementation;
@@ -82,8 +83,8 @@ TEST(RunBench, EveryOperationAndInputRuns) {
   options.min_seconds = 0.002;
   const auto report = run_bench(options);
   ASSERT_TRUE(report.ok()) << report.status();
-  // 20 operations with their samplers, and three further ways to give the inputs of five samplers; the baseline
-  // has no generator.
+  // 20 operations with their samplers, and three further ways to give the inputs of five samplers; the
+  // baseline has no generator.
   EXPECT_EQ(report->results.size(), 2 * (15u + 20u) - 5u);
   EXPECT_TRUE(report->limits.copy.empty());
   std::map<std::string, std::uint64_t> rejected;
@@ -137,7 +138,8 @@ TEST(RunBench, TakesGoogleBenchmarksFlags) {
   const auto report = run_bench(options);
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_EQ(report->results.at(0).repetitions, 2);
-  for (const char* flag : {"--benchmark_out=file", "--help", "--benchmark_repetitions=many", "--benchmark_repetitions"}) {
+  for (const char* flag :
+       {"--benchmark_out=file", "--help", "--benchmark_repetitions=many", "--benchmark_repetitions"}) {
     options.benchmark_flags = {flag};
     EXPECT_EQ(run_bench(options).status().code(), absl::StatusCode::kInvalidArgument) << flag;
   }
@@ -146,7 +148,8 @@ TEST(RunBench, TakesGoogleBenchmarksFlags) {
 TEST(RunBench, StopsAndRunsAgain) {
   const auto options = small_run("sample_reflection/.*/0.3,0.3/256/simd$");
   int results = 0;
-  const auto stopped = run_bench(options, [&](const BenchProgress& p) { return p.result == nullptr || ++results < 2; });
+  const auto stopped =
+      run_bench(options, [&](const BenchProgress& p) { return p.result == nullptr || ++results < 2; });
   EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(results, 2);
   const auto report = run_bench(options);

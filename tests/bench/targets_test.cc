@@ -1,5 +1,5 @@
-// The performance to reach: every row is measured, or says why not. Whether it is met is not tested: that is for
-// a quiet machine.
+// The performance to reach: every row is measured, or says why not. Whether it is met is not tested: that is
+// for a quiet machine.
 #include "bench/targets.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,8 @@ TEST(Targets, EachIsMeasuredOrSaysWhyNot) {
   ASSERT_TRUE(columns.ok()) << columns.status();
   BenchReport report;
   report.threads = 2;
-  const absl::Status status = measure_targets(options, *columns, [] { return true; }, report);
+  const absl::Status status = measure_targets(
+      options, *columns, [] { return true; }, report);
   ASSERT_TRUE(status.ok()) << status;
   int missing = 0;
   for (const TargetResult& t : report.targets) {
@@ -45,7 +46,9 @@ TEST(Targets, WithoutServerOrThreads) {
   ASSERT_TRUE(columns.ok());
   BenchReport report;
   report.threads = 1;
-  ASSERT_TRUE(measure_targets({}, *columns, [] { return true; }, report).ok());
+  ASSERT_TRUE(measure_targets(
+                  {}, *columns, [] { return true; }, report)
+                  .ok());
   EXPECT_FALSE(report.targets.back().measured);
   EXPECT_NE(report.targets.back().note.find("no server"), std::string::npos);
   EXPECT_FALSE(report.targets.back().met());
@@ -55,7 +58,10 @@ TEST(Targets, Stop) {
   auto columns = Columns::make(std::size_t{1} << 17);
   ASSERT_TRUE(columns.ok());
   BenchReport report;
-  EXPECT_EQ(measure_targets({}, *columns, [] { return false; }, report).code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(measure_targets(
+                {}, *columns, [] { return false; }, report)
+                .code(),
+            absl::StatusCode::kCancelled);
   EXPECT_EQ(report.targets.size(), 1u);
 }
 

@@ -47,19 +47,19 @@ struct BenchOptions {
 // One benchmark's result. `samples` lanes were timed again and again, of which `rejected` are occluded.
 struct BenchResult {
   Operation operation{};
-  std::string sampler;         // "none" where the operation has no use for one
+  std::string sampler;  // "none" where the operation has no use for one
   double alpha_x = 0, alpha_y = 0;
   std::string implementation;  // "scalar" | "one-lane" | "simd" | "simd-threads" | "remote"
   // How inputs are given: "columns" (everything per lane, all i_z > 0), or the same but "one-roughness" (one
   // value for all lanes), "generator" (in-kernel random numbers) or "backfacing" (i_z < 0 in 10 % of lanes).
   std::string inputs;
   std::uint64_t batch = 0;
-  int threads = 1;                 // that compute on this machine; 0 for remote
-  double ns_per_sample = 0;        // median of the repetitions
-  double ns_per_sample_min = 0;    // fastest repetition
+  int threads = 1;               // that compute on this machine; 0 for remote
+  double ns_per_sample = 0;      // median of the repetitions
+  double ns_per_sample_min = 0;  // fastest repetition
   int repetitions = 0;
   std::uint64_t samples = 0, rejected = 0;
-  double bytes_per_sample = 0;     // of input and output columns
+  double bytes_per_sample = 0;  // of input and output columns
   // Shares of what the machine can do, 0 where not measured: of the speed at which the same columns are
   // copied (same batch, same threads), and of its peak of fused multiply-adds (estimate).
   double share_of_copy = 0, share_of_fma = 0;
@@ -137,15 +137,15 @@ struct BenchReport {
 struct BenchProgress {
   std::size_t done = 0, total = 0;  // benchmarks
   const BenchResult* result = nullptr;
-  std::string_view part;            // "limits", "throughput", "rejections", "targets"
+  std::string_view part;  // "limits", "throughput", "rejections", "targets"
 };
 // Returns false to stop: run_bench() then returns Cancelled.
 using BenchCallback = std::function<bool(const BenchProgress&)>;
 
 // Runs benchmarks; prints nothing. InvalidArgument for a filter that is no regular expression or matches
 // nothing and for other options that mean nothing; FailedPrecondition while another run is under way in this
-// process (Google Benchmark's state is global) or for a target that is not here; ResourceExhausted if there is
-// no memory for the columns; the remote engine's errors.
+// process (Google Benchmark's state is global) or for a target that is not here; ResourceExhausted if there
+// is no memory for the columns; the remote engine's errors.
 absl::StatusOr<BenchReport> run_bench(const BenchOptions& options, const BenchCallback& progress = {});
 
 // A table for eyes.
