@@ -66,7 +66,9 @@ class Health {
     return queue.Next(&tag, &good) && good;
   }
   static grpc::ByteBuffer request(const std::string& service) {
-    const grpc::Slice slice(std::string("\x0a") + static_cast<char>(service.size()) + service);
+    std::string bytes = {0x0a, static_cast<char>(service.size())};
+    bytes.append(service);
+    const grpc::Slice slice(bytes);
     return grpc::ByteBuffer(&slice, 1);
   }
   static Status parse(const grpc::ByteBuffer& response) {
