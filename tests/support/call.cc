@@ -66,8 +66,8 @@ float uniform(std::uint64_t seed, std::uint64_t index) {
 std::string call_name(const Call& call) {
   std::string name(facetwise::name(call.operation));
   if (call.operation != Operation::masking && call.operation != Operation::evaluate_reflection)
-    name += "/" + std::string(facetwise::name(call.sampler));
-  if (call.shadowing == Shadowing::uncorrelated) name += "/uncorrelated";
+    name.append("/").append(facetwise::name(call.sampler));
+  if (call.shadowing == Shadowing::uncorrelated) name.append("/uncorrelated");
   return name;
 }
 
