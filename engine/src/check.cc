@@ -74,6 +74,7 @@ absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& a
   if (!active) return absl::OkStatus();
   if (active->size() > lanes)
     return invalid("active", absl::StrCat(active->size(), " indices for ", lanes, " lanes"));
+  if (auto status = check_memory("active", active->data(), active->size(), 4, 4); !status.ok()) return status;
   std::uint32_t largest = 0;
   for (const std::uint32_t lane : *active) largest = lane > largest ? lane : largest;
   if (!active->empty() && largest >= lanes)
