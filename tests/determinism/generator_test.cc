@@ -1,33 +1,13 @@
 // The in-kernel generator: Philox4x32-10, and which numbers a lane gets.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cstring>
 
 #include "support/call.h"
+#include "support/philox.h"
 
 namespace facetwise::test {
 namespace {
-
-// Written from the paper, one block at a time (Salmon et al. 2011, section 3.3).
-std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> c, std::array<std::uint32_t, 2> key) {
-  for (int round = 0; round < 10; ++round) {
-    const std::uint64_t a = std::uint64_t{0xD2511F53} * c[0], b = std::uint64_t{0xCD9E8D57} * c[2];
-    c = {static_cast<std::uint32_t>(b >> 32) ^ c[1] ^ key[0], static_cast<std::uint32_t>(b),
-         static_cast<std::uint32_t>(a >> 32) ^ c[3] ^ key[1], static_cast<std::uint32_t>(a)};
-    key = {key[0] + 0x9E3779B9, key[1] + 0xBB67AE85};
-  }
-  return c;
-}
-
-TEST(Philox, KnownAnswers) {
-  using Block = std::array<std::uint32_t, 4>;
-  const std::uint32_t ones = 0xFFFFFFFF;
-  EXPECT_EQ(philox({0, 0, 0, 0}, {0, 0}), (Block{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
-  EXPECT_EQ(philox({ones, ones, ones, ones}, {ones, ones}), (Block{0x408f276d, 0x41c83b0e, 0xa20bc7c6, 0x6d5451fd}));
-  EXPECT_EQ(philox({0x243f6a88, 0x85a308d3, 0x13198a2e, 0x03707344}, {0xa4093822, 0x299f31d0}),
-            (Block{0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1}));
-}
 
 constexpr std::size_t kLanes = 1000;
 constexpr Call kCall{Operation::sample_reflection, Sampler::exact, Shadowing::correlated};
@@ -35,9 +15,8 @@ constexpr Call kCall{Operation::sample_reflection, Sampler::exact, Shadowing::co
 Lanes lanes_with_numbers(std::uint64_t seed, std::uint32_t dimension, const std::vector<std::uint64_t>& ids) {
   Lanes lanes = ordinary_lanes(ids.size(), 3);
   for (std::size_t lane = 0; lane < ids.size(); ++lane) {
-    const auto words = philox({static_cast<std::uint32_t>(ids[lane]), static_cast<std::uint32_t>(ids[lane] >> 32), dimension, 0},
-                              {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)});
-    for (std::size_t k = 0; k < 3; ++k) lanes.in[8 + k][lane] = static_cast<float>(words[k] >> 8) * 0x1p-24f;
+    const auto u = generated(seed, dimension, ids[lane]);
+    for (std::size_t k = 0; k < 3; ++k) lanes.in[8 + k][lane] = u[k];
   }
   return lanes;
 }
