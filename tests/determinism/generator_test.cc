@@ -1,92 +1,138 @@
-// The in-kernel generator: Philox4x32-10, and which numbers a lane gets.
-#include <gtest/gtest.h>
-
+// The in-kernel generator: the same results as columns of Philox's numbers (support/philox.h), which belong
+// to a lane's id.
 #include <cstring>
+#include <memory>
+#include <numeric>
 
-#include "support/call.h"
+#include "determinism/compare.h"
+#include "support/counts.h"
+#include "support/hard_lanes.h"
 #include "support/philox.h"
 
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kLanes = 1000;
-constexpr Call kCall{Operation::sample_reflection, Sampler::exact, Shadowing::correlated};
+constexpr std::size_t kLanes = kQuick ? 1200 : 9000;
 
-Lanes lanes_with_numbers(std::uint64_t seed, std::uint32_t dimension, const std::vector<std::uint64_t>& ids) {
-  Lanes lanes = ordinary_lanes(ids.size(), 3);
-  for (std::size_t lane = 0; lane < ids.size(); ++lane) {
-    const auto u = generated(seed, dimension, ids[lane]);
+std::vector<Call> sampling_calls() {
+  std::vector<Call> calls;
+  for (const Call& call : all_calls())
+    if (call.operation <= Operation::sample_reflection) calls.push_back(call);
+  return calls;
+}
+
+Answer generate(const Call& call, const Lanes& lanes, const Generator& generator,
+                const Execution& execution = {}) {
+  Answer answer;
+  Batch batch = make_batch(call, lanes, answer);
+  batch.u1 = batch.u2 = batch.u3 = {};
+  batch.generator = generator;
+  answer.statistics = run_ok(call, batch, execution);
+  return answer;
+}
+
+Lanes with_numbers(Lanes lanes, const Generator& generator, const std::vector<std::uint64_t>& ids) {
+  for (std::size_t lane = 0; lane < lanes.count; ++lane) {
+    const auto u = generated(generator.seed, generator.dimension, ids[lane]);
     for (std::size_t k = 0; k < 3; ++k) lanes.in[8 + k][lane] = u[k];
   }
   return lanes;
 }
 
-Answer generate(const Lanes& lanes, const Generator& generator, const Execution& execution) {
-  Answer answer;
-  Batch batch = make_batch(kCall, lanes, answer);
-  batch.u1 = batch.u2 = batch.u3 = {};
-  batch.generator = generator;
-  const auto statistics = run(kCall.operation, batch, execution);
-  EXPECT_TRUE(statistics.ok()) << statistics.status();
-  if (statistics.ok()) answer.statistics = *statistics;
-  return answer;
+std::vector<std::uint64_t> following(std::uint64_t first, std::size_t count) {
+  std::vector<std::uint64_t> ids(count);
+  std::iota(ids.begin(), ids.end(), first);
+  return ids;
 }
 
-TEST(Generator, GivesTheNumbersOfPhilox) {
-  const std::uint64_t seed = 0x0123456789ABCDEF;
-  const std::uint64_t first = 0xFFFFFFFFu - 500;  // the counter carries into its upper word within the batch
-  std::vector<std::uint64_t> following(kLanes), arbitrary(kLanes);
-  for (std::size_t lane = 0; lane < kLanes; ++lane) {
-    following[lane] = first + lane;
-    arbitrary[lane] = hash(1, lane);
-  }
-  // A column of ids has 4-byte alignment.
-  std::vector<std::uint32_t> memory(2 * kLanes + 1);
-  std::memcpy(memory.data() + 1, arbitrary.data(), 8 * kLanes);
-  const Column<std::uint64_t> column(reinterpret_cast<const std::uint64_t*>(memory.data() + 1), kLanes);
-
-  for (const Target target : available_targets()) {
-    for (const bool one_lane : {false, true}) {
-      const Execution execution{.target = target, .one_lane = one_lane};
-      const Lanes by_index = lanes_with_numbers(seed, 7, following);
-      EXPECT_TRUE(same_bits(generate(by_index, {.seed = seed, .dimension = 7, .first_id = first}, execution),
-                            run_call(kCall, by_index)));
-      const Lanes by_id = lanes_with_numbers(seed, 7, arbitrary);
-      EXPECT_TRUE(same_bits(generate(by_id, {.seed = seed, .dimension = 7, .id = column}, execution),
-                            run_call(kCall, by_id)));
-    }
-  }
-  const Lanes one_id = lanes_with_numbers(seed, 7, std::vector<std::uint64_t>(kLanes, 42));
-  EXPECT_TRUE(same_bits(generate(one_id, {.seed = seed, .dimension = 7, .id = std::uint64_t{42}}, {}),
-                        run_call(kCall, one_id)));
-}
-
-TEST(Generator, ALaneKeepsItsNumbersWhenTheBatchIsCompacted) {
-  const Lanes lanes = ordinary_lanes(kLanes, 3);
-  const Answer whole = generate(lanes, {.seed = 5, .first_id = 1000}, {});
-  std::vector<std::uint32_t> active;
-  for (std::uint32_t lane = 0; lane < kLanes; lane += 1 + hash(8, lane) % 4) active.push_back(kLanes - 1 - lane);
-  Answer answer;
-  Batch batch = make_batch(kCall, lanes, answer);
-  batch.u1 = batch.u2 = batch.u3 = {};
-  batch.generator = Generator{.seed = 5, .first_id = 1000};
-  batch.active = active;
-  ASSERT_TRUE(run(kCall.operation, batch).ok());
-  for (const std::uint32_t lane : active) {
-    for (std::size_t k = 0; k < answer.out.size(); ++k) {
-      if (answer.out[k].empty()) continue;
-      ASSERT_EQ(answer.out[k][lane], whole.out[k][lane]);
+TEST(Generator, NumbersOfTheLanesIndex) {
+  const Lanes lanes = hard_lanes(Kind::mixed, kLanes, 71);
+  // Among them, ids that carry into the upper word within the batch and within a vector, and that wrap.
+  const std::uint64_t firsts[] = {
+      0, 1, 0xFFFFFFFBu, 0x100000000u - kLanes / 2, 0x123456789ABCDEFu, ~std::uint64_t{0} - 20};
+  for (std::size_t k = 0; k < std::size(firsts); ++k) {
+    const Generator generator{.seed = hash(1, k),
+                              .dimension = static_cast<std::uint32_t>(k == 0 ? 0 : hash(2, k)),
+                              .id = {},
+                              .first_id = firsts[k]};
+    const Lanes columns = with_numbers(lanes, generator, following(firsts[k], kLanes));
+    for (const Call& call : sampling_calls()) {
+      const Answer expected = compute(call, columns);
+      for (const Target target : available_targets())
+        for (const bool one_lane : {false, true})
+          expect_same(call, expected, generate(call, lanes, generator, {target, one_lane, false}));
     }
   }
 }
 
-TEST(Generator, SeedsAndDimensionsDiffer) {
-  const Lanes lanes = ordinary_lanes(kLanes, 3);
-  const Answer answer = generate(lanes, {.seed = 1, .dimension = 0}, {});
-  EXPECT_FALSE(same_bits(answer, generate(lanes, {.seed = 2, .dimension = 0}, {})));
-  EXPECT_FALSE(same_bits(answer, generate(lanes, {.seed = 1, .dimension = 1}, {})));
-  EXPECT_FALSE(same_bits(answer, generate(lanes, {.seed = 1 + (std::uint64_t{1} << 32), .dimension = 0}, {})));
-  EXPECT_TRUE(same_bits(answer, generate(lanes, {.seed = 1, .dimension = 0}, {})));
+TEST(Generator, SeedAndDimensionMatter) {
+  const Lanes lanes = hard_lanes(Kind::ordinary, 200, 72);
+  const Call call{Operation::sample_reflection, Sampler::exact, Shadowing::correlated};
+  std::vector<Answer> all;
+  for (const std::uint64_t seed :
+       {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{1} << 32, std::uint64_t{1} << 63})
+    for (const std::uint32_t dimension : {0u, 1u, 1u << 31})
+      all.push_back(generate(call, lanes, {.seed = seed, .dimension = dimension}));
+  for (std::size_t a = 0; a < all.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) EXPECT_FALSE(same_bits(all[a], all[b]));
+}
+
+// 64-bit ids on and off their natural alignment, contiguous and strided. first_id counts only without them.
+TEST(Generator, IdsInAnyPlace) {
+  const Lanes lanes = hard_lanes(Kind::mixed, kLanes, 73);
+  std::vector<std::uint64_t> ids(kLanes);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) ids[lane] = hash(74, lane) >> (lane % 64);
+  for (const std::size_t stride : {8u, 12u, 28u})
+    for (const std::size_t offset : {0u, 4u}) {
+      const std::unique_ptr<char[]> memory(new char[offset + (kLanes - 1) * stride + 8]);
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        std::memcpy(memory.get() + offset + lane * stride, &ids[lane], 8);
+      const auto* first = reinterpret_cast<const std::uint64_t*>(memory.get() + offset);
+      const Generator generator{.seed = 9, .dimension = 3, .id = {first, kLanes, stride}, .first_id = 77};
+      const Lanes columns = with_numbers(lanes, generator, ids);
+      for (const Call& call : sampling_calls())
+        expect_same(call, compute(call, columns), generate(call, lanes, generator));
+    }
+}
+
+TEST(Generator, OneIdForAllLanes) {
+  const Lanes lanes = hard_lanes(Kind::mixed, 500, 75);
+  const std::uint64_t id = 0xFEDCBA9876543210u;
+  alignas(8) char memory[12];
+  std::memcpy(memory + 4, &id, 8);
+  for (const auto& column : {Column<std::uint64_t>(id),
+                             Column<std::uint64_t>(reinterpret_cast<const std::uint64_t*>(memory + 4), 1)}) {
+    const Generator generator{.seed = 5, .dimension = 0, .id = column};
+    const Lanes columns = with_numbers(lanes, generator, std::vector<std::uint64_t>(500, id));
+    for (const Call& call : sampling_calls())
+      expect_same(call, compute(call, columns), generate(call, lanes, generator));
+  }
+}
+
+// A path keeps its numbers when its batch is split, or compacted to an active list.
+TEST(Generator, SplitAndActive) {
+  const Lanes lanes = hard_lanes(Kind::mixed, kLanes, 76);
+  const Generator generator{.seed = 6, .dimension = 1, .id = {}, .first_id = 0xFFFFFE00u};
+  auto active = shuffled(kLanes, 77);
+  active.resize(kLanes / 2);
+  for (const Call& call : sampling_calls()) {
+    const Answer whole = generate(call, lanes, generator);
+    for (std::size_t begin = 0, length = 0; begin < kLanes; begin += length) {
+      length = std::min<std::size_t>(kLanes - begin, 1 + hash(78, begin) % 700);
+      Generator moved = generator;
+      moved.first_id += begin;
+      const Answer part = generate(call, slice(lanes, begin, length), moved);
+      for (std::size_t k = 0; k < length; ++k) expect_same_lane(call, whole, begin + k, part, k);
+    }
+    Answer got;
+    Batch batch = make_batch(call, lanes, got);
+    batch.u1 = batch.u2 = batch.u3 = {};
+    batch.generator = generator;
+    batch.active = active;
+    EXPECT_EQ(run_ok(call, batch).lanes(), active.size());
+    for (const std::uint32_t lane : active) expect_same_lane(call, whole, lane, got, lane);
+    if (HasFailure()) return;
+  }
 }
 
 }  // namespace

@@ -2,17 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cfenv>
 #include <cstring>
 #include <limits>
 #include <numeric>
 
 #include "support/call.h"
-#include "tbb/global_control.h"
-#include "tbb/task_arena.h"
-#if defined(__x86_64__)
-#include <xmmintrin.h>
-#endif
 
 namespace facetwise::test {
 namespace {
@@ -168,30 +162,6 @@ TEST_P(Invariance, OutputsLeftOut) {
     }
     EXPECT_EQ(answer.out[left_out], std::vector<float>(kLanes, -7.0f));
   }
-}
-
-TEST_P(Invariance, AnyThreads) {
-  const Lanes lanes = adversarial_lanes(100'003, 11);
-  const Answer single = run_call(GetParam(), lanes, {.single_thread = true});
-  EXPECT_TRUE(same_bits(run_call(GetParam(), lanes), single));
-  tbb::task_arena(2).execute([&] { EXPECT_TRUE(same_bits(run_call(GetParam(), lanes), single)); });
-  tbb::task_arena(1).execute([&] { EXPECT_TRUE(same_bits(run_call(GetParam(), lanes), single)); });
-}
-
-TEST_P(Invariance, CallersFloatingPointModes) {
-  std::fesetround(FE_UPWARD);
-#if defined(__x86_64__)
-  const unsigned before = _mm_getcsr() | 0x8040;  // flush to zero, denormals are zero
-  _mm_setcsr(before);
-#endif
-  const Answer answer = run_call(GetParam(), lanes_);
-#if defined(__x86_64__)
-  EXPECT_EQ(_mm_getcsr() & ~0x3Fu, before & ~0x3Fu);
-  _mm_setcsr(0x1F80);
-#endif
-  EXPECT_EQ(std::fegetround(), FE_UPWARD);
-  std::fesetround(FE_TONEAREST);
-  EXPECT_TRUE(same_bits(answer, whole_));
 }
 
 std::string test_name(const testing::TestParamInfo<Call>& info) {
