@@ -86,8 +86,8 @@ Block& Block::operator=(Block&& other) noexcept {
 
 grpc::Slice Block::into_slice() && {
   char* data = std::exchange(data_, nullptr);
-  return grpc::Slice(data, std::exchange(size_, 0), [](void* block) { pool().give_back(static_cast<char*>(block)); },
-                     data);
+  return grpc::Slice(
+      data, std::exchange(size_, 0), [](void* block) { pool().give_back(static_cast<char*>(block)); }, data);
 }
 
 }  // namespace facetwise::wire

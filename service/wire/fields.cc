@@ -61,7 +61,9 @@ std::optional<Operation> operation_from(int value) { return from(value, Operatio
 std::optional<Distribution> distribution_from(int value) {
   return from(value, Distribution::ggx, std::optional(Distribution::ggx));
 }
-std::optional<Masking> masking_from(int value) { return from(value, Masking::smith, std::optional(Masking::smith)); }
+std::optional<Masking> masking_from(int value) {
+  return from(value, Masking::smith, std::optional(Masking::smith));
+}
 std::optional<Shadowing> shadowing_from(int value) {
   return from(value, Shadowing::uncorrelated, std::optional(Shadowing::correlated));
 }
@@ -71,7 +73,9 @@ std::optional<Sampler> sampler_from(int value, Operation operation) {
 }
 
 v1::Operation to_proto(Operation value) { return static_cast<v1::Operation>(static_cast<int>(value) + 1); }
-v1::Distribution to_proto(Distribution value) { return static_cast<v1::Distribution>(static_cast<int>(value) + 1); }
+v1::Distribution to_proto(Distribution value) {
+  return static_cast<v1::Distribution>(static_cast<int>(value) + 1);
+}
 v1::Masking to_proto(Masking value) { return static_cast<v1::Masking>(static_cast<int>(value) + 1); }
 v1::Shadowing to_proto(Shadowing value) { return static_cast<v1::Shadowing>(static_cast<int>(value) + 1); }
 v1::SamplerKind to_proto(Sampler value) { return static_cast<v1::SamplerKind>(static_cast<int>(value) + 1); }

@@ -10,8 +10,8 @@
 namespace facetwise::wire {
 namespace {
 
-using google::protobuf::io::CodedOutputStream;
 using google::protobuf::internal::WireFormatLite;
+using google::protobuf::io::CodedOutputStream;
 
 // Bytes that begin(), column() and message() put before a column: two tags and two lengths.
 constexpr std::size_t kLargestHeader = 32;
@@ -19,7 +19,8 @@ constexpr std::size_t kAlignment = 64;
 
 }  // namespace
 
-MessageWriter::MessageWriter(std::size_t columns, std::size_t column_bytes, std::size_t other_bytes, bool aligned)
+MessageWriter::MessageWriter(std::size_t columns, std::size_t column_bytes, std::size_t other_bytes,
+                             bool aligned)
     : block_(column_bytes + other_bytes + (columns + 2) * (kLargestHeader + kAlignment)), aligned_(aligned) {
   parts_.reserve(columns + 1);
   parts_.push_back({0, 0});

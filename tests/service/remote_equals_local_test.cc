@@ -59,8 +59,8 @@ enum class Shape { contiguous, strided };
 template <class T>
 class Memory {
  public:
-  Memory(std::size_t count, Shape shape, T value) : count_(count), step_(shape == Shape::strided ? 3 : 1),
-                                                    values_(count * step_ + 1, value) {}
+  Memory(std::size_t count, Shape shape, T value)
+      : count_(count), step_(shape == Shape::strided ? 3 : 1), values_(count * step_ + 1, value) {}
   Column<T> in() const { return {values_.data(), count_, step_ * sizeof(T)}; }
   OutputColumn<T> out() { return {values_.data(), count_, step_ * sizeof(T)}; }
   T& operator[](std::size_t k) { return values_[k * step_]; }
@@ -96,7 +96,8 @@ Outputs make_outputs(Operation operation, Batch& batch, Shape shape, bool some) 
 
 bool takes(Operation operation, Sampler sampler) {
   if (operation == Operation::sample_normal) return samples_normals(sampler);
-  if (operation == Operation::evaluate_reflection || operation == Operation::masking) return sampler == Sampler::cap;
+  if (operation == Operation::evaluate_reflection || operation == Operation::masking)
+    return sampler == Sampler::cap;
   return true;
 }
 
@@ -114,7 +115,8 @@ struct Case {
 
 class Remote : public ::testing::Test {
  protected:
-  std::unique_ptr<Engine> connect_to(const std::vector<std::string>& addresses, std::size_t piece_bytes, int window) {
+  std::unique_ptr<Engine> connect_to(const std::vector<std::string>& addresses, std::size_t piece_bytes,
+                                     int window) {
     ConnectOptions options;
     options.piece_bytes = piece_bytes;
     options.window = window;
@@ -127,7 +129,7 @@ class Remote : public ::testing::Test {
   void compare(Engine& remote, const Case& c) {
     const std::vector<Lane> lanes = make_lanes(c.lanes);
     std::map<std::string, Memory<float>> columns;
-    const auto add = [&](const char* name, float Lane::* member) {
+    const auto add = [&](const char* name, float Lane::*member) {
       auto& memory = columns.emplace(name, Memory<float>(c.lanes, c.shape, 0)).first->second;
       for (std::size_t k = 0; k < c.lanes; ++k) memory[k] = lanes[k].*member;
     };
@@ -139,7 +141,8 @@ class Remote : public ::testing::Test {
     for (std::size_t k = 0; k < c.lanes; ++k) ids[k] = lanes[k].id;
     std::vector<std::uint32_t> active;
     for (std::size_t k = 0; k < c.lanes; ++k)
-      if (const std::size_t lane = (k * 7 + 3) % c.lanes; c.lanes % 7 != 0 && lane % 3 != 1) active.push_back(lane);
+      if (const std::size_t lane = (k * 7 + 3) % c.lanes; c.lanes % 7 != 0 && lane % 3 != 1)
+        active.push_back(lane);
 
     for (const Operation operation : all_operations()) {
       for (const Sampler sampler : all_samplers()) {
@@ -162,7 +165,8 @@ class Remote : public ::testing::Test {
           if (!samples && operation != Operation::masking) batch.outgoing = {0.0f, 0.6f, 0.8f};
         }
         if (generates) {
-          batch.generator = Generator{.seed = 0xfedcba9876543210, .dimension = 3, .id = {}, .first_id = (1ull << 32) - 10};
+          batch.generator =
+              Generator{.seed = 0xfedcba9876543210, .dimension = 3, .id = {}, .first_id = (1ull << 32) - 10};
           if (c.random == Random::generator_ids) batch.generator->id = ids.in();
           if (c.random == Random::generator_one_id) batch.generator->id = std::uint64_t{99};
         }
@@ -211,8 +215,8 @@ TEST_F(Remote, GivesTheSameBytesForEveryKindOfRandomNumbers) {
     for (const Random random : {Random::generator, Random::generator_ids, Random::generator_one_id})
       for (const bool active : {false, true})
         for (const bool some : {false, true}) {
-          SCOPED_TRACE(::testing::Message() << lanes << " lanes, random " << static_cast<int>(random) << ", active "
-                                            << active << ", some outputs " << some);
+          SCOPED_TRACE(::testing::Message() << lanes << " lanes, random " << static_cast<int>(random)
+                                            << ", active " << active << ", some outputs " << some);
           compare(*engine, {.lanes = lanes,
                             .shape = Shape::strided,
                             .broadcast = some,
@@ -263,8 +267,10 @@ TEST_F(Remote, OutputsMayBeTheInputs) {
   ASSERT_NE(engine, nullptr);
   std::vector<Lane> near = make_lanes(3001), far = near;
   const auto in_place = [](std::vector<Lane>& lanes) {
-    const auto in = [&](float Lane::* member) { return Column<float>(&(lanes[0].*member), lanes.size(), sizeof(Lane)); };
-    const auto out = [&](float Lane::* member) {
+    const auto in = [&](float Lane::*member) {
+      return Column<float>(&(lanes[0].*member), lanes.size(), sizeof(Lane));
+    };
+    const auto out = [&](float Lane::*member) {
       return OutputColumn<float>(&(lanes[0].*member), lanes.size(), sizeof(Lane));
     };
     Batch batch;
@@ -290,7 +296,8 @@ TEST_F(Remote, CompactsTheSame) {
       for (const bool has_active : {false, true}) {
         for (const std::size_t width : {0, 1, 3, 150}) {
           if (width == 150 && lanes > 1009) continue;
-          SCOPED_TRACE(::testing::Message() << lanes << " lanes, active " << has_active << ", columns " << width);
+          SCOPED_TRACE(::testing::Message()
+                       << lanes << " lanes, active " << has_active << ", columns " << width);
           Memory<std::uint8_t> status(lanes, shape, 0);
           Memory<float> values(lanes, shape, 0);
           std::vector<std::uint32_t> active;
@@ -312,7 +319,10 @@ TEST_F(Remote, CompactsTheSame) {
             for (std::size_t k = 0; k < width; ++k) result.columns.emplace_back(room, shape, kUntouched);
             for (std::size_t k = 0; k < width; ++k)
               dense.push_back({k == 1 ? Column<float>(3.5f) : values.in(), result.columns[k].out()});
-            Compaction compaction{.lanes = lanes, .active = {}, .status = status.in(), .index = result.index.out(),
+            Compaction compaction{.lanes = lanes,
+                                  .active = {},
+                                  .status = status.in(),
+                                  .index = result.index.out(),
                                   .columns = dense};
             if (has_active) compaction.active = active;
             const auto accepted = on.compact(compaction);
@@ -384,9 +394,11 @@ TEST_F(Remote, ErrorsNameTheServer) {
   const std::string nobody = "unix:" + folder_.path("nobody");
   const auto refused = connect(std::vector{nobody}, options);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_NE(std::string(refused.status().message()).find("server " + nobody), std::string::npos) << refused.status();
+  EXPECT_NE(std::string(refused.status().message()).find("server " + nobody), std::string::npos)
+      << refused.status();
   EXPECT_EQ(connect(std::vector<std::string>{}).status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(connect(std::vector<std::string>{"nonsense"}).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(connect(std::vector<std::string>{"nonsense"}).status().code(),
+            absl::StatusCode::kInvalidArgument);
 
   ServerProcess server({"--listen", "unix:" + folder_.path("s")});
   options.connect_timeout = std::chrono::milliseconds(2000);

@@ -15,7 +15,9 @@ namespace {
 using wire::MessageReader;
 using wire::MessageWriter;
 
-absl::Status bad_answer(absl::string_view what) { return absl::InternalError(absl::StrCat("its answer ", what)); }
+absl::Status bad_answer(absl::string_view what) {
+  return absl::InternalError(absl::StrCat("its answer ", what));
+}
 
 unsigned wanted_outputs(Batch& batch) {
   unsigned outputs = batch.out.status.present() ? 1u << v1::STATUS : 0;
@@ -27,7 +29,8 @@ unsigned wanted_outputs(Batch& batch) {
 std::size_t most_lanes(Batch& batch, bool sends_ids, unsigned outputs, const PieceLimits& limits) {
   std::size_t request = sends_ids ? sizeof(std::uint64_t) : 0, response = 0;
   for (const InputField& field : input_fields())
-    if (const auto& column = field.column(batch); column.present() && !column.one_value()) request += sizeof(float);
+    if (const auto& column = field.column(batch); column.present() && !column.one_value())
+      request += sizeof(float);
   for (const auto& place : wire::output_places())
     if (outputs & (1u << place.output)) response += sizeof(float);
   if (outputs & (1u << v1::STATUS)) ++response;
@@ -78,8 +81,10 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
     const Column<float>& column = fields[k].column(batch);
     return column.present() ? values_sent(column, range) * sizeof(float) : 0;
   };
-  const std::size_t id_bytes =
-      !batch.generator ? 0 : sends_ids_ ? range.size() * 8 : batch.generator->id.present() ? 8 : 0;
+  const std::size_t id_bytes = !batch.generator                ? 0
+                               : sends_ids_                    ? range.size() * 8
+                               : batch.generator->id.present() ? 8
+                                                               : 0;
   std::size_t bytes = id_bytes;
   for (std::size_t k = 0; k < fields.size(); ++k) bytes += bytes_of(k);
 
@@ -88,7 +93,8 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
   for (std::size_t k = 0; k < fields.size(); ++k) {
     if (bytes_of(k) == 0) continue;
     if (places[k].part == 1)  // x: y and z follow
-      writer.begin(places[k].field, MessageWriter::field_bytes(bytes_of(k)) + MessageWriter::field_bytes(bytes_of(k + 1)) +
+      writer.begin(places[k].field, MessageWriter::field_bytes(bytes_of(k)) +
+                                        MessageWriter::field_bytes(bytes_of(k + 1)) +
                                         MessageWriter::field_bytes(bytes_of(k + 2)));
     gather(fields[k].column(batch), positions_, range,
            writer.column(places[k].part == 0 ? places[k].field : places[k].part, bytes_of(k)));
@@ -166,7 +172,8 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
         good = reader.length(*field, bytes) && bytes == range.size() &&
                scatter(reader, batch_.out.status, positions_, range);
         break;
-      default: good = read_column(*field, field->number, 0);
+      default:
+        good = read_column(*field, field->number, 0);
     }
   }
   if (!good || !reader.finished()) return bad_answer("is damaged");

@@ -1,6 +1,5 @@
-#include "facetwise/client.h"
-
 #include "absl/strings/str_cat.h"
+#include "facetwise/client.h"
 #include "facetwise/v1/sampler.grpc.pb.h"
 #include "src/pieces.h"
 #include "src/pipeline.h"
@@ -16,7 +15,9 @@ constexpr std::size_t kMostCompactColumns = 64;
 class RemoteEngine final : public Engine {
  public:
   RemoteEngine(std::vector<Connection> connections, const ConnectOptions& options, std::size_t message_bytes)
-      : connections_(std::move(connections)), options_(options), limits_{options.piece_bytes, message_bytes} {}
+      : connections_(std::move(connections)),
+        options_(options),
+        limits_{options.piece_bytes, message_bytes} {}
 
   absl::StatusOr<Statistics> run(Operation operation, const Batch& batch) override {
     if (auto status = check(operation, batch); !status.ok()) return status;
@@ -32,7 +33,8 @@ class RemoteEngine final : public Engine {
     std::size_t accepted = 0, begin = 0;
     do {
       Compaction part = compaction;
-      part.columns = compaction.columns.subspan(begin, std::min(kMostCompactColumns, compaction.columns.size() - begin));
+      part.columns =
+          compaction.columns.subspan(begin, std::min(kMostCompactColumns, compaction.columns.size() - begin));
       if (begin > 0) part.index = {};
       CompactPieces compact_pieces(part, limits_);
       const Pieces pieces = compact_pieces.pieces();
@@ -75,9 +77,11 @@ grpc::ChannelArguments channel_arguments(const std::string& address) {
 
 absl::Status check_address(const std::string& address) {
   const auto colon = address.rfind(':');
-  if (is_unix(address) ? address.size() > 5 : colon != std::string::npos && colon > 0 && colon + 1 < address.size())
+  if (is_unix(address) ? address.size() > 5
+                       : colon != std::string::npos && colon > 0 && colon + 1 < address.size())
     return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("address: \"", address, "\" is neither unix:PATH nor HOST:PORT"));
+  return absl::InvalidArgumentError(
+      absl::StrCat("address: \"", address, "\" is neither unix:PATH nor HOST:PORT"));
 }
 
 }  // namespace
@@ -93,7 +97,8 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
   wire::keep_grpc();
   std::vector<Connection> connections;
   for (const std::string& address : addresses) {
-    auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments(address));
+    auto channel =
+        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments(address));
     channel->GetState(true);  // begins to connect: all at once
     connections.push_back({address, channel, std::make_unique<grpc::GenericStub>(channel)});
   }
@@ -112,7 +117,8 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
     message_bytes = std::min<std::size_t>(message_bytes, info.max_message_bytes());
   }
   if (message_bytes < 4096)
-    return absl::FailedPreconditionError(absl::StrCat("a server takes messages of ", message_bytes, " bytes only"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("a server takes messages of ", message_bytes, " bytes only"));
   return std::make_unique<RemoteEngine>(std::move(connections), options, message_bytes);
 }
 

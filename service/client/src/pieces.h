@@ -48,8 +48,8 @@ class Split {
 
 // What the pieces must respect.
 struct PieceLimits {
-  std::size_t piece_bytes;        // wanted
-  std::size_t message_bytes;      // the servers' limit
+  std::size_t piece_bytes;    // wanted
+  std::size_t message_bytes;  // the servers' limit
   // The most lanes of a piece with so many bytes a lane in the request and in the response.
   std::size_t lanes(std::size_t request_bytes, std::size_t response_bytes) const {
     constexpr std::size_t kOtherBytes = 1024;  // small fields, lengths, columns of one value

@@ -28,9 +28,8 @@ SamplerService::SamplerService(const ServerOptions& options)
   AddMethod(new RpcServiceMethod(
       "/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
       new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
-          [](SamplerService* service, grpc::ServerContext*, const v1::InfoRequest*, v1::InfoResponse* response) {
-            return service->info(*response);
-          },
+          [](SamplerService* service, grpc::ServerContext*, const v1::InfoRequest*,
+             v1::InfoResponse* response) { return service->info(*response); },
           this)));
   AddMethod(new RpcServiceMethod(
       "/facetwise.v1.Sampler/Benchmark", RpcMethod::SERVER_STREAMING,
@@ -95,12 +94,14 @@ grpc::Status SamplerService::benchmark(grpc::ServerContext& context, const v1::B
                                        grpc::ServerWriter<v1::BenchmarkProgress>& writer) {
   constexpr std::size_t kLongestFilter = 1000;
   if (!options_.allow_benchmark || !options_.benchmark)
-    return error(grpc::StatusCode::PERMISSION_DENIED, "benchmarks are off: start the server with --allow-benchmark");
+    return error(grpc::StatusCode::PERMISSION_DENIED,
+                 "benchmarks are off: start the server with --allow-benchmark");
   if (request.filter().size() > kLongestFilter)
     return error(grpc::StatusCode::INVALID_ARGUMENT,
                  absl::StrCat("filter: ", request.filter().size(), " bytes, at most ", kLongestFilter));
   if (const double s = request.min_seconds(); s != 0 && !(s > 0 && s <= 10))
-    return error(grpc::StatusCode::INVALID_ARGUMENT, absl::StrCat("min_seconds: ", s, " is not in (0, 10], nor 0"));
+    return error(grpc::StatusCode::INVALID_ARGUMENT,
+                 absl::StrCat("min_seconds: ", s, " is not in (0, 10], nor 0"));
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
   if (benchmark_runs_.exchange(true))
