@@ -8,6 +8,7 @@
 #include <random>
 #include <string>
 
+#include "columns.h"
 #include "facetwise/client.h"
 #include "gtest/gtest.h"
 #include "server_process.h"
@@ -15,10 +16,11 @@
 namespace facetwise {
 namespace {
 
+using testing::kUntouched;
+using testing::Memory;
 using testing::ServerProcess;
+using testing::Shape;
 using testing::TemporaryFolder;
-
-constexpr float kUntouched = -7777.0f;
 
 // Lanes as a structure each, so that any column can be strided. Some are invalid, smooth, or face away.
 struct Lane {
@@ -52,27 +54,6 @@ std::vector<Lane> make_lanes(std::size_t count) {
   }
   return lanes;
 }
-
-enum class Shape { contiguous, strided };
-
-// A column's memory: values one after the other, or `stride` floats apart.
-template <class T>
-class Memory {
- public:
-  Memory(std::size_t count, Shape shape, T value)
-      : count_(count), step_(shape == Shape::strided ? 3 : 1), values_(count * step_ + 1, value) {}
-  Column<T> in() const { return {values_.data(), count_, step_ * sizeof(T)}; }
-  OutputColumn<T> out() { return {values_.data(), count_, step_ * sizeof(T)}; }
-  T& operator[](std::size_t k) { return values_[k * step_]; }
-  bool operator==(const Memory& other) const {
-    return values_.size() == other.values_.size() &&
-           std::memcmp(values_.data(), other.values_.data(), values_.size() * sizeof(T)) == 0;
-  }
-
- private:
-  std::size_t count_, step_;
-  std::vector<T> values_;
-};
 
 struct Outputs {
   std::vector<Memory<float>> columns;
@@ -285,72 +266,6 @@ TEST_F(Remote, OutputsMayBeTheInputs) {
   ASSERT_TRUE(engine->sample_reflection(in_place(far)).ok());
   ASSERT_TRUE(sample_reflection(in_place(near)).ok());
   EXPECT_EQ(std::memcmp(near.data(), far.data(), near.size() * sizeof(Lane)), 0);
-}
-
-TEST_F(Remote, CompactsTheSame) {
-  ServerProcess server({"--listen", "unix:" + folder_.path("s")});
-  const auto engine = connect_to(server.addresses(), 4096, 4);
-  ASSERT_NE(engine, nullptr);
-  for (const std::size_t lanes : kSizes) {
-    for (const Shape shape : {Shape::contiguous, Shape::strided}) {
-      for (const bool has_active : {false, true}) {
-        for (const std::size_t width : {0, 1, 3, 150}) {
-          if (width == 150 && lanes > 1009) continue;
-          SCOPED_TRACE(::testing::Message()
-                       << lanes << " lanes, active " << has_active << ", columns " << width);
-          Memory<std::uint8_t> status(lanes, shape, 0);
-          Memory<float> values(lanes, shape, 0);
-          std::vector<std::uint32_t> active;
-          for (std::size_t k = 0; k < lanes; ++k) {
-            status[k] = (k * 2654435761u >> 7) % 4;
-            values[k] = static_cast<float>(k) + 0.5f;
-            if (k % 5 != 2) active.insert(active.begin() + active.size() / 2, k);
-          }
-          const std::size_t room = has_active ? active.size() : lanes;
-          struct Result {
-            std::vector<Memory<float>> columns;
-            Memory<std::uint32_t> index;
-            std::size_t accepted = 0;
-            bool operator==(const Result&) const = default;
-          };
-          const auto compact_on = [&](Engine& on) {
-            Result result{{}, {room, shape, 12345}};
-            std::vector<Compaction::DenseColumn> dense;
-            for (std::size_t k = 0; k < width; ++k) result.columns.emplace_back(room, shape, kUntouched);
-            for (std::size_t k = 0; k < width; ++k)
-              dense.push_back({k == 1 ? Column<float>(3.5f) : values.in(), result.columns[k].out()});
-            Compaction compaction{.lanes = lanes,
-                                  .active = {},
-                                  .status = status.in(),
-                                  .index = result.index.out(),
-                                  .columns = dense};
-            if (has_active) compaction.active = active;
-            const auto accepted = on.compact(compaction);
-            EXPECT_TRUE(accepted.ok()) << accepted.status();
-            result.accepted = accepted.value_or(99999);
-            return result;
-          };
-          const Result far = compact_on(*engine), near = compact_on(*local_engine());
-          EXPECT_EQ(far.accepted, near.accepted);
-          EXPECT_TRUE(far == near);
-        }
-      }
-    }
-  }
-}
-
-TEST_F(Remote, OneStatusForAllCompactsTheSame) {
-  ServerProcess server({"--listen", "unix:" + folder_.path("s")});
-  const auto engine = connect_to(server.addresses(), 4096, 4);
-  ASSERT_NE(engine, nullptr);
-  for (const std::uint8_t status : {0, 2}) {
-    std::vector<std::uint32_t> index(5000, 1);
-    Compaction compaction{.lanes = 5000, .active = {}, .status = status, .index = index, .columns = {}};
-    const auto accepted = engine->compact(compaction);
-    ASSERT_TRUE(accepted.ok()) << accepted.status();
-    EXPECT_EQ(*accepted, status == 0 ? 5000u : 0u);
-    EXPECT_EQ(index[4999], status == 0 ? 4999u : 1u);
-  }
 }
 
 // The same error as the local engine's, and no output written.
