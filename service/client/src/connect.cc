@@ -70,7 +70,7 @@ grpc::ChannelArguments channel_arguments(const std::string& address) {
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // Engines do not share connections, whatever process-wide state they would come from.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // Estimating the bandwidth helps over distance and over Unix sockets; on loopback TCP it halves it.
+  // Estimating the bandwidth helps over distance and over Unix sockets; on loopback TCP its pings only cost.
   if (is_loopback(address)) arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   return arguments;
 }
