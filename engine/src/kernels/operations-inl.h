@@ -200,7 +200,12 @@ struct Sample {
                   exceptions.Harmless(u3, 0.0f), drawn);
 
     // o = 2 (i.M) / (M.M) M - i
-    const V rho = (drawn.im + drawn.im) / drawn.mm;
+    V rho = (drawn.im + drawn.im) / drawn.mm;
+    if constexpr (Sampler::kExact) {
+      if (!i.all_front) rho = Select(i.front, rho, Max(rho, Set(d, kSmallestRho)));
+    } else if constexpr (!Sampler::kUnit) {
+      rho = Max(rho, Set(d, kSmallestRho));
+    }
     const V ox = Fms(rho, drawn.mx, i.x), oy = Fms(rho, drawn.my, i.y);
     V oz = Fms(rho, drawn.mz, i.z);
     if constexpr (Sampler::kExact) oz = Max(oz, Set(d, kRim));
@@ -229,7 +234,9 @@ struct Sample {
 
     if (kNormal || (tile.wanted & kWantsNormal)) {
       const V inverse_length = one / Sqrt(drawn.mm);
-      const V im = drawn.im * inverse_length;
+      V im = drawn.im;
+      if constexpr (Sampler::kVisible) im = Max(im, Set(d, kSmallestIm));
+      im = im * inverse_length;
       StoreU(exceptions.Output(drawn.mx * inverse_length, zero), d, tile.out[kOutMx] + lane);
       StoreU(exceptions.Output(drawn.my * inverse_length, zero), d, tile.out[kOutMy] + lane);
       StoreU(exceptions.Output(drawn.mz * inverse_length, one), d, tile.out[kOutMz] + lane);
@@ -303,9 +310,9 @@ struct Query {
     const V largest = Set(d, 3e38f);  // a density can be beyond the floats straight below a smooth surface
 
     if constexpr (kPdf) {
-      // i.h is |h|^2 / 2 for unit vectors; far less only by the tolerance of their length.
-      const V ih = Max(Dot(i.x, i.y, i.z, mx, my, mz), m2 * Set(d, 0x1p-12f));
-      const V pdf = Min(numerator / (denominator * Sampler::TwoN(d, i, ih, mz)), largest);
+      // i.h = |h|^2 / 2: the sum i.h cancels where o is nearly -i, this does not.
+      const V two_n = Sampler::TwoN(d, i, m2 * Set(d, 0.5f), mz);
+      const V pdf = Min(numerator / (denominator * two_n), largest);
       StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
     }
     if constexpr (kValue) {

@@ -16,6 +16,7 @@
 #define FACETWISE_SAMPLERS_INL_H_
 #endif
 
+#include "facetwise/model.h"
 #include "src/kernels/ggx-inl.h"
 #include "src/math/sincos-inl.h"
 
@@ -25,6 +26,9 @@ namespace HWY_NAMESPACE {
 
 // i.M of visible normals is kept above this, where rounding could make it 0 or negative. `ndf` rejects below.
 inline constexpr float kSmallestIm = 0x1p-84f;
+// rho = 2 i.M / M.M is |m_hat|^2 / M.M for half vectors, at least 1 / (largest alpha)^2. It is kept above half of
+// that where m_hat is so short that i.M is nothing but rounding.
+inline constexpr float kSmallestRho = 0.5f / (kLargestAlpha * kLargestAlpha);
 // Likewise m_hat_z (times nu, for half vectors); its square does not underflow.
 inline constexpr float kSmallestZ = 0x1p-62f;
 
@@ -148,7 +152,7 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   if (!i.all_front) hz = Max(hz, Set(d, kSmallestZ));  // t can be very small
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but by M itself, so that o is its reflection even where m_hat is short.
-  drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
+  drawn.im = Dot(i.wx, i.wy, i.z, hx, hy, hz);
   // Where A is not what w has (ggx-inl.h, kSmallestA).
   if (!i.all_front) {
     const V half_hh = Dot(hx, hy, hz, hx, hy, hz) * Set(d, 0.5f);
