@@ -13,7 +13,7 @@ namespace facetwise {
 inline constexpr std::size_t kGrain = 8192;
 
 // Calls body(begin, end) on ranges that make up [0, positions), in the caller's TBB arena. Ranges begin at
-// multiples of 16 lanes, the widest vector.
+// multiples of kUnit lanes: whole vectors of every target.
 template <class Body>
 void for_each_range(std::size_t positions, const Execution& execution, const Body& body) {
   if (positions == 0) return;

@@ -44,7 +44,7 @@ struct Tile {
   std::size_t lanes = 0;
   const float* in[kInputs] = {};   // those that the operation reads
   float* out[kOutputs] = {};       // all that it has; unwanted ones are scratch memory
-  std::uint8_t* status = nullptr;  // likewise
+  std::uint8_t* status = nullptr;  // null unless wanted has kWantsStatus
   unsigned wanted = 0;             // kWants...: where leaving an output out saves work
   bool uncorrelated = false;       // Shadowing::uncorrelated
 };
