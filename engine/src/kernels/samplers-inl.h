@@ -76,13 +76,8 @@ struct Ndf {
   }
 };
 
-// Visible normals by the projected hemisphere: Heitz 2018. With e = w_xy / |w_xy|, s = (1 + c) / 2:
-//   m_hat = t1 (-e_y, e_x, 0) + t2 (-c e_x, -c e_y, s_hat) + t_w w / nu,
-//   t1 = r cos phi,  R^2 = 1 - t1^2,  t2 = R - s (R - r sin phi),  t_w^2 = R^2 - t2^2.
-// R - r sin phi and R + r sin phi have the product 1 - u1, so that neither needs to cancel; with
-// b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (p + (1 - s) b).
-struct Heitz {
-  static constexpr bool kUnit = true;
+// What samplers of all visible normals share: N = sigma(i).
+struct VisibleNormals {
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = true;
   static constexpr bool kNIsSigma = true;
@@ -92,6 +87,15 @@ struct Heitz {
   static HWY_INLINE V TwoN(D, const Incident<D>& i, V, V) {
     return i.t;
   }
+};
+
+// Visible normals by the projected hemisphere: Heitz 2018. With e = w_xy / |w_xy|, s = (1 + c) / 2:
+//   m_hat = t1 (-e_y, e_x, 0) + t2 (-c e_x, -c e_y, s_hat) + t_w w / nu,
+//   t1 = r cos phi,  R^2 = 1 - t1^2,  t2 = R - s (R - r sin phi),  t_w^2 = R^2 - t2^2.
+// R - r sin phi and R + r sin phi have the product 1 - u1, so that neither needs to cancel; with
+// b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (p + (1 - s) b).
+struct Heitz : VisibleNormals {
+  static constexpr bool kUnit = true;
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
@@ -162,17 +166,8 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
 }
 
 // Visible normals by a spherical cap: Dupuy & Benyoub 2023.
-struct Cap {
+struct Cap : VisibleNormals {
   static constexpr bool kUnit = false;
-  static constexpr bool kUsesU3 = false;
-  static constexpr bool kVisible = true;
-  static constexpr bool kNIsSigma = true;
-  static constexpr bool kExact = false;
-
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D, const Incident<D>& i, V, V) {
-    return i.t;
-  }
 
   template <class D, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
