@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "src/check.h"
+#include "src/composition.h"
 #include "src/float_environment.h"
 #include "src/parallel.h"
 #include "src/tile.h"
@@ -15,19 +16,6 @@ namespace {
 // Lanes of a tile: its buffers stay in the first-level cache.
 constexpr std::size_t kStaged = 512;
 static_assert(kStaged % kWidest == 0);
-
-Kernel kernel_for(const KernelTable& table, Operation operation, Sampler sampler) {
-  const auto index = static_cast<std::size_t>(sampler);
-  switch (operation) {
-    case Operation::sample_normal: return table.sample_normal[index];
-    case Operation::sample_reflection: return table.sample_reflection[index];
-    case Operation::pdf_reflection: return table.pdf_reflection[index];
-    case Operation::evaluate_reflection: return table.evaluate_reflection;
-    case Operation::evaluate_and_pdf: return table.evaluate_and_pdf[index];
-    case Operation::masking: return table.masking;
-  }
-  return nullptr;
-}
 
 // A checked batch and the kernel for it.
 struct Plan {
@@ -43,28 +31,49 @@ struct Plan {
     std::size_t index;
     const Column<float>* column;
   };
+  struct OneValue {
+    std::size_t index;
+    float value;
+  };
   struct Output {
     std::size_t index;
     const OutputColumn<float>* column;
   };
-  Input per_lane[kInputs], one_value[kInputs];
+  Input per_lane[kInputs];
+  OneValue one_value[kInputs];
   Output out[kOutputs];
   std::size_t per_lane_count = 0, one_value_count = 0, out_count = 0;
-  OutputColumn<std::uint8_t> status;
+  OutputColumn<std::uint8_t> bytes[kByteOutputs];
 };
+
+unsigned wants(std::size_t output) {
+  switch (output) {
+    case kOutMx: case kOutMy: case kOutMz: case kOutIm: return kWantsNormal;
+    case kOutPdf: return kWantsPdf;
+    case kOutWeight: return kWantsWeight;
+    case kOutValue: return kWantsValue;
+    case kOutShare: return kWantsShare;
+    default: return 0;
+  }
+}
 
 void make_plan(Operation operation, const Batch& batch, const KernelTable& table, Plan& plan) {
   const BatchColumns columns(batch);
+  const Model& model = batch.model;
   plan.table = &table;
-  plan.kernel = kernel_for(table, operation, batch.sampler);
+  const bool affine = is_affine(batch);
+  plan.kernel = find_kernel(table, operation, model, batch.sampler, affine);
   plan.active = batch.active ? batch.active->data() : nullptr;
   plan.generator = batch.generator ? &*batch.generator : nullptr;
-  plan.generates_u3 = plan.generator && uses_u3(batch.sampler);
+  plan.generates_u3 = plan.generator && reads_u3(operation, batch);
   for (std::size_t k = 0; k < kInputs; ++k) {
     const Column<float>& column = *columns.in[k];
-    if (!column.present()) continue;
-    if (column.one_value()) {
-      plan.one_value[plan.one_value_count++] = {k, &column};
+    if (!column.present()) {
+      const bool needed = k == kF90 ? model.interface == Interface::schlick : affine;
+      if (const auto otherwise = input_fields()[k].otherwise; otherwise && needed)
+        plan.one_value[plan.one_value_count++] = {k, *otherwise};
+    } else if (column.one_value()) {
+      plan.one_value[plan.one_value_count++] = {k, *column.data()};
     } else {
       plan.per_lane[plan.per_lane_count++] = {k, &column};
     }
@@ -73,14 +82,18 @@ void make_plan(Operation operation, const Batch& batch, const KernelTable& table
     const OutputColumn<float>& column = *columns.out[k];
     if (!column.present()) continue;
     plan.out[plan.out_count++] = {k, &column};
-    if (k >= kOutMx && k <= kOutIm) plan.tile.wanted |= kWantsNormal;
-    if (k == kOutPdf) plan.tile.wanted |= kWantsPdf;
-    if (k == kOutWeight) plan.tile.wanted |= kWantsWeight;
-    if (k == kOutShare) plan.tile.wanted |= kWantsShare;
+    plan.tile.wanted |= wants(k);
   }
-  plan.status = batch.out.status;
-  if (plan.status.present()) plan.tile.wanted |= kWantsStatus;
-  plan.tile.uncorrelated = batch.model.shadowing == Shadowing::uncorrelated;
+  for (std::size_t k = 0; k < kByteOutputs; ++k) plan.bytes[k] = *columns.byte_out[k];
+  if (plan.bytes[kOutStatus].present()) plan.tile.wanted |= kWantsStatus;
+  plan.tile.normals_alone = operation == Operation::sample_normal;
+  plan.tile.transmits = operation == Operation::sample_transmission || operation == Operation::evaluate_transmission;
+  plan.tile.uncorrelated = model.shadowing == Shadowing::uncorrelated;
+  plan.tile.biased = model.normalisation == Normalisation::biased;
+  plan.tile.importance = model.transport == Transport::importance;
+  plan.tile.retro = model.retro;
+  plan.tile.interface = model.interface;
+  plan.tile.table = model.table.get();
 }
 
 // Runs a range of a plan's lanes, tile by tile. Contiguous columns are used where they lie; the others, and the
@@ -171,9 +184,10 @@ class Stage {
       tile_.out[k] = direct ? column->data() + begin : out_[k];
       staged |= !direct;
     }
-    if (plan_.status.present()) {
-      const bool direct = in_place && plan_.status.stride() == 1;
-      tile_.status = direct ? plan_.status.data() + begin : status_;
+    for (std::size_t k = 0; k < kByteOutputs; ++k) {
+      if (!plan_.bytes[k].present()) continue;
+      const bool direct = in_place && plan_.bytes[k].stride() == 1;
+      (k == kOutStatus ? tile_.status : tile_.event) = direct ? plan_.bytes[k].data() + begin : bytes_[k];
       staged |= !direct;
     }
     return staged;
@@ -189,8 +203,10 @@ class Stage {
         for (std::size_t j = 0; j < tile_.lanes; ++j) (*column)[lane_at(begin + j)] = out_[k][j];
       }
     }
-    if (tile_.status == status_)
-      for (std::size_t j = 0; j < tile_.lanes; ++j) plan_.status[lane_at(begin + j)] = status_[j];
+    for (std::size_t k = 0; k < kByteOutputs; ++k) {
+      if (!plan_.bytes[k].present() || (k == kOutStatus ? tile_.status : tile_.event) != bytes_[k]) continue;
+      for (std::size_t j = 0; j < tile_.lanes; ++j) plan_.bytes[k][lane_at(begin + j)] = bytes_[k][j];
+    }
   }
 
   const Plan& plan_;
@@ -198,7 +214,7 @@ class Stage {
   alignas(64) float in_[kInputs][kStaged];
   alignas(64) float out_[kOutputs][kStaged];
   alignas(64) float unwanted_[kStaged];
-  alignas(64) std::uint8_t status_[kStaged];
+  alignas(64) std::uint8_t bytes_[kByteOutputs][kStaged];
   alignas(64) std::uint64_t id_[kStaged];
 };
 

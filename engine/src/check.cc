@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "src/composition.h"
 #include "src/tile.h"
 
 namespace facetwise {
@@ -84,20 +85,19 @@ absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& a
 
 namespace {
 
-absl::Status check_choices(Operation operation, const Batch& batch) {
-  if (operation > Operation::masking) return invalid("operation", "unknown value");
-  if (batch.model.distribution > Distribution::ggx) return invalid("model.distribution", "unknown value");
-  if (batch.model.masking > Masking::smith) return invalid("model.masking", "unknown value");
-  if (batch.model.shadowing > Shadowing::uncorrelated) return invalid("model.shadowing", "unknown value");
-  if (batch.sampler > Sampler::exact) return invalid("sampler", "unknown value");
-  if (operation == Operation::sample_normal && !samples_normals(batch.sampler))
-    return invalid("sampler", absl::StrCat(view(name(batch.sampler)),
-                                           " samples reflections only; sample_normal takes ndf, heitz or cap"));
-  return absl::OkStatus();
+// Whether the operation reads a column that it knows, with this model: a column is missing where it does, and one too
+// many where it does not.
+bool reads(Operation operation, const Batch& batch, std::size_t input) {
+  const Interface interface = batch.model.interface;
+  switch (input) {
+    case kEta: return interface == Interface::dielectric;
+    case kF0:
+    case kF90: return interface == Interface::schlick;
+    default: return true;
+  }
 }
 
 absl::Status check_inputs(Operation operation, const Batch& batch, const BatchColumns& columns) {
-  const bool samples = operation == Operation::sample_normal || operation == Operation::sample_reflection;
   const InputField* fields = input_fields().data();
   for (std::size_t k = 0; k < kInputs; ++k) {
     const Column<float>& column = *columns.in[k];
@@ -105,19 +105,22 @@ absl::Status check_inputs(Operation operation, const Batch& batch, const BatchCo
     if (!known && !column.present()) continue;
     const absl::string_view field = view(fields[k].name);
     const bool random = k >= kU1;
+    const bool read = reads(operation, batch, k);
     if (!column.present()) {
-      const bool needed = !(random && batch.generator) && !(k == kU3 && !uses_u3(batch.sampler));
+      const bool needed = read && !fields[k].otherwise && !(random && batch.generator) &&
+                          !(k == kU3 && !reads_u3(operation, batch));
       if (!needed) continue;
       return invalid(field, random ? absl::StrCat("missing: ", view(name(batch.sampler)),
                                                   " needs it unless a generator is given")
                                    : absl::StrCat("missing: ", view(name(operation)), " needs it"));
     }
     if (!known) return invalid(field, absl::StrCat(view(name(operation)), " does not read it"));
+    if (!read) return invalid(field, absl::StrCat("a ", view(name(batch.model.interface)), " interface does not read it"));
     if (random && batch.generator) return invalid("generator", absl::StrCat("given together with ", field));
     if (auto status = check_input(field, column, batch.lanes); !status.ok()) return status;
   }
   if (!batch.generator) return absl::OkStatus();
-  if (!samples) return invalid("generator", absl::StrCat(view(name(operation)), " takes no random numbers"));
+  if (!samples(operation)) return invalid("generator", absl::StrCat(view(name(operation)), " takes no random numbers"));
   if (!batch.generator->id.present()) return absl::OkStatus();
   return check_input("generator.id", batch.generator->id, batch.lanes);
 }
@@ -132,8 +135,18 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
       return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
     if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
   }
-  if (!batch.out.status.present()) return absl::OkStatus();
-  return check_output("out.status", batch.out.status, batch.lanes);
+  for (std::size_t k = 0; k < kByteOutputs; ++k) {
+    const OutputColumn<std::uint8_t>& column = *columns.byte_out[k];
+    if (!column.present()) continue;
+    const absl::string_view field = view(byte_fields()[k].name);
+    if (!(byte_fields()[k].operations & bit(operation)))
+      return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
+    if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
+  }
+  const bool ggx_smith = batch.model.distribution == Distribution::ggx && batch.model.masking == Masking::smith;
+  if (columns.out[kOutShare]->present() && !ggx_smith)
+    return invalid("out.share_unoccluded", "known in closed form for ggx with smith masking only");
+  return absl::OkStatus();
 }
 
 absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
@@ -141,8 +154,8 @@ absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
     const std::string_view* field;
     MemoryUse memory;
   };
-  static constexpr std::string_view kId = "generator.id", kActive = "active", kStatus = "out.status";
-  Use inputs[kInputs + 2], outputs[kOutputs + 1];
+  static constexpr std::string_view kId = "generator.id", kActive = "active";
+  Use inputs[kInputs + 2], outputs[kOutputs + kByteOutputs];
   std::size_t input_count = 0, output_count = 0;
   for (std::size_t k = 0; k < kInputs; ++k)
     if (columns.in[k]->present())
@@ -154,7 +167,9 @@ absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
   for (std::size_t k = 0; k < kOutputs; ++k)
     if (columns.out[k]->present())
       outputs[output_count++] = {&output_fields()[k].name, memory_use(*columns.out[k])};
-  if (batch.out.status.present()) outputs[output_count++] = {&kStatus, memory_use(batch.out.status)};
+  for (std::size_t k = 0; k < kByteOutputs; ++k)
+    if (columns.byte_out[k]->present())
+      outputs[output_count++] = {&byte_fields()[k].name, memory_use(*columns.byte_out[k])};
 
   for (std::size_t k = 0; k < output_count; ++k) {
     for (std::size_t j = 0; j < input_count; ++j) {
@@ -174,7 +189,7 @@ absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
 }  // namespace
 
 absl::Status check(Operation operation, const Batch& batch) {
-  if (auto status = check_choices(operation, batch); !status.ok()) return status;
+  if (auto status = check_composition(operation, batch); !status.ok()) return status;
   if (auto status = check_active(batch.active, batch.lanes); !status.ok()) return status;
   const BatchColumns columns(batch);
   if (auto status = check_inputs(operation, batch, columns); !status.ok()) return status;

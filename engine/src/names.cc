@@ -15,14 +15,23 @@ struct Named {
   std::string_view name;
 };
 
-constexpr Named<Distribution> kDistributions[] = {{Distribution::ggx, "ggx"}};
-constexpr Named<Masking> kMaskings[] = {{Masking::smith, "smith"}};
+constexpr Named<Distribution> kDistributions[] = {{Distribution::ggx, "ggx"},
+                                                  {Distribution::beckmann, "beckmann"},
+                                                  {Distribution::student_t, "student_t"},
+                                                  {Distribution::phong, "phong"},
+                                                  {Distribution::table, "table"}};
+constexpr Named<Masking> kMaskings[] = {{Masking::smith, "smith"}, {Masking::vcavity, "vcavity"}};
 constexpr Named<Shadowing> kShadowings[] = {{Shadowing::correlated, "correlated"},
                                             {Shadowing::uncorrelated, "uncorrelated"}};
-// The first name of a value is the one that is printed.
+constexpr Named<Normalisation> kNormalisations[] = {{Normalisation::unbiased, "unbiased"},
+                                                    {Normalisation::biased, "biased"}};
+constexpr Named<Interface> kInterfaces[] = {{Interface::conductor, "conductor"},
+                                            {Interface::schlick, "schlick"},
+                                            {Interface::dielectric, "dielectric"}};
+constexpr Named<Transport> kTransports[] = {{Transport::radiance, "radiance"}, {Transport::importance, "importance"}};
 constexpr Named<Sampler> kSamplers[] = {{Sampler::ndf, "ndf"},         {Sampler::heitz, "heitz"},
                                         {Sampler::cap, "cap"},         {Sampler::bounded, "bounded"},
-                                        {Sampler::exact, "exact"},     {Sampler::cap, "visible"}};
+                                        {Sampler::exact, "exact"},     {Sampler::visible, "visible"}};
 constexpr Named<LaneStatus> kStatuses[] = {{LaneStatus::accepted, "accepted"},
                                            {LaneStatus::occluded, "occluded"},
                                            {LaneStatus::smooth, "smooth"},
@@ -37,7 +46,11 @@ constexpr Named<Operation> kOperations[] = {{Operation::sample_normal, "sample_n
                                             {Operation::pdf_reflection, "pdf_reflection"},
                                             {Operation::evaluate_reflection, "evaluate_reflection"},
                                             {Operation::evaluate_and_pdf, "evaluate_and_pdf"},
-                                            {Operation::masking, "masking"}};
+                                            {Operation::masking, "masking"},
+                                            {Operation::sample_transmission, "sample_transmission"},
+                                            {Operation::evaluate_transmission, "evaluate_transmission"},
+                                            {Operation::sample_scattering, "sample_scattering"},
+                                            {Operation::evaluate_scattering, "evaluate_scattering"}};
 
 template <class T, std::size_t n>
 std::string_view name_in(const Named<T> (&table)[n], T value) {
@@ -58,6 +71,9 @@ std::optional<T> parse_in(const Named<T> (&table)[n], std::string_view text) {
 std::string_view name(Distribution value) { return name_in(kDistributions, value); }
 std::string_view name(Masking value) { return name_in(kMaskings, value); }
 std::string_view name(Shadowing value) { return name_in(kShadowings, value); }
+std::string_view name(Normalisation value) { return name_in(kNormalisations, value); }
+std::string_view name(Interface value) { return name_in(kInterfaces, value); }
+std::string_view name(Transport value) { return name_in(kTransports, value); }
 std::string_view name(Sampler value) { return name_in(kSamplers, value); }
 std::string_view name(LaneStatus value) { return name_in(kStatuses, value); }
 std::string_view name(Target value) { return name_in(kTargets, value); }
@@ -66,24 +82,34 @@ std::string_view name(Operation value) { return name_in(kOperations, value); }
 std::optional<Distribution> parse_distribution(std::string_view text) { return parse_in(kDistributions, text); }
 std::optional<Masking> parse_masking(std::string_view text) { return parse_in(kMaskings, text); }
 std::optional<Shadowing> parse_shadowing(std::string_view text) { return parse_in(kShadowings, text); }
+std::optional<Normalisation> parse_normalisation(std::string_view text) { return parse_in(kNormalisations, text); }
+std::optional<Interface> parse_interface(std::string_view text) { return parse_in(kInterfaces, text); }
+std::optional<Transport> parse_transport(std::string_view text) { return parse_in(kTransports, text); }
 std::optional<Sampler> parse_sampler(std::string_view text) { return parse_in(kSamplers, text); }
 std::optional<Target> parse_target(std::string_view text) { return parse_in(kTargets, text); }
 std::optional<Operation> parse_operation(std::string_view text) { return parse_in(kOperations, text); }
 
 std::span<const Sampler> all_samplers() {
-  static constexpr std::array kAll = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded,
-                                      Sampler::exact};
+  static constexpr std::array kAll = {Sampler::ndf,     Sampler::heitz, Sampler::cap,
+                                      Sampler::bounded, Sampler::exact, Sampler::visible};
   return kAll;
 }
 
 std::span<const Operation> all_operations() {
-  static constexpr std::array kAll = {Operation::sample_normal,       Operation::sample_reflection,
-                                      Operation::pdf_reflection,      Operation::evaluate_reflection,
-                                      Operation::evaluate_and_pdf,    Operation::masking};
+  static constexpr auto kAll = [] {
+    std::array<Operation, std::size(kOperations)> all{};
+    for (std::size_t k = 0; k < all.size(); ++k) all[k] = kOperations[k].value;
+    return all;
+  }();
   return kAll;
 }
 
-bool samples_normals(Sampler sampler) { return sampler <= Sampler::cap; }
-bool uses_u3(Sampler sampler) { return sampler == Sampler::exact; }
+bool samples_normals(Sampler sampler) { return sampler != Sampler::bounded && sampler != Sampler::exact; }
+
+bool uses_u3(const Model& model, Sampler sampler) {
+  if (sampler == Sampler::exact) return true;
+  if (sampler != Sampler::visible) return false;
+  return model.masking == Masking::vcavity;
+}
 
 }  // namespace facetwise

@@ -10,30 +10,34 @@
 
 namespace facetwise {
 
-// Indices of a tile's columns: the order of input_fields() and output_fields().
-enum InputIndex { kIx, kIy, kIz, kAlphaX, kAlphaY, kOx, kOy, kOz, kU1, kU2, kU3, kInputs };
+// Indices of a tile's columns: the order of input_fields(), output_fields() and byte_fields().
+enum InputIndex {
+  kIx, kIy, kIz, kAlphaX, kAlphaY, kMeanX, kMeanY, kCorrelation, kEta, kF0, kF90, kOx, kOy, kOz, kU1, kU2, kU3, kInputs
+};
 enum OutputIndex {
   kOutOx, kOutOy, kOutOz, kOutMx, kOutMy, kOutMz, kOutIm, kOutPdf, kOutWeight, kOutValue, kOutMasking,
-  kOutArea, kOutShare, kOutputs
+  kOutArea, kOutShare, kOutBranch, kOutEtaScale, kOutputs
 };
+enum ByteIndex { kOutStatus, kOutEvent, kByteOutputs };
 
 inline constexpr unsigned kWantsNormal = 1;  // m or i.m
 inline constexpr unsigned kWantsPdf = 2;
 inline constexpr unsigned kWantsWeight = 4;
 inline constexpr unsigned kWantsShare = 8;
 inline constexpr unsigned kWantsStatus = 16;
+inline constexpr unsigned kWantsValue = 32;
 
 // A batch's columns by these indices.
 struct BatchColumns {
   const Column<float>* in[kInputs];
   const OutputColumn<float>* out[kOutputs];
-  explicit BatchColumns(const Batch& b)
-      : in{&b.incident.x, &b.incident.y, &b.incident.z, &b.alpha_x, &b.alpha_y, &b.outgoing.x,
-           &b.outgoing.y, &b.outgoing.z, &b.u1,         &b.u2,      &b.u3},
-        out{&b.out.outgoing.x, &b.out.outgoing.y, &b.out.outgoing.z, &b.out.normal.x,
-            &b.out.normal.y,   &b.out.normal.z,   &b.out.incident_dot_normal, &b.out.pdf,
-            &b.out.weight,     &b.out.value,      &b.out.masking, &b.out.projected_area,
-            &b.out.share_unoccluded} {}
+  const OutputColumn<std::uint8_t>* byte_out[kByteOutputs];
+  explicit BatchColumns(const Batch& b) {
+    Batch& batch = const_cast<Batch&>(b);  // the tables name the columns of batches that are filled in
+    for (std::size_t k = 0; k < kInputs; ++k) in[k] = &input_fields()[k].column(batch);
+    for (std::size_t k = 0; k < kOutputs; ++k) out[k] = &output_fields()[k].column(batch);
+    for (std::size_t k = 0; k < kByteOutputs; ++k) byte_out[k] = &byte_fields()[k].column(batch);
+  }
 };
 
 // The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and written up to the next
@@ -42,11 +46,20 @@ inline constexpr std::size_t kWidest = 32;
 
 struct Tile {
   std::size_t lanes = 0;
-  const float* in[kInputs] = {};   // those that the operation reads
+  const float* in[kInputs] = {};   // those that the operation reads, the optional ones too
   float* out[kOutputs] = {};       // all that it has; unwanted ones are scratch memory
   std::uint8_t* status = nullptr;  // null unless wanted has kWantsStatus
+  std::uint8_t* event = nullptr;   // of scattering; scratch memory if unwanted
   unsigned wanted = 0;             // kWants...: where leaving an output out saves work
+  // What is the same for all lanes and too small to compile kernels apart for.
+  bool normals_alone = false;      // sample_normal
+  bool transmits = false;          // *_transmission, of the kernels that also serve *_scattering
   bool uncorrelated = false;       // Shadowing::uncorrelated
+  bool biased = false;             // Normalisation::biased
+  bool importance = false;         // Transport::importance
+  bool retro = false;
+  Interface interface = Interface::conductor;
+  const SlopeTable* table = nullptr;
 };
 
 // Adds the tile's lanes that are not accepted to the statistics.
@@ -63,19 +76,30 @@ struct PhiloxTile {
   float* u[3] = {};
 };
 
-// One target's kernels. Samplers are indexed by Sampler; entries that do not exist are null.
+// The kernels of a distribution with a masking, indexed by Sampler; entries that do not exist are null.
+struct SurfaceKernels {
+  Kernel sample[6] = {};         // sample_normal, sample_reflection
+  Kernel query[6] = {};          // pdf_reflection, evaluate_reflection, evaluate_and_pdf
+  Kernel scatter[6] = {};        // sample_transmission, sample_scattering
+  Kernel scatter_query[6] = {};  // evaluate_transmission, evaluate_scattering
+  Kernel masking = nullptr;
+};
+
+// Those of a distribution. `affine` serves mean slopes and correlated roughness.
+struct DistributionKernels {
+  SurfaceKernels smith, smith_affine, vcavity;
+};
+
 struct KernelTable {
-  Kernel sample_normal[5];
-  Kernel sample_reflection[5];
-  Kernel pdf_reflection[5];
-  Kernel evaluate_reflection;
-  Kernel evaluate_and_pdf[5];
-  Kernel masking;
+  const DistributionKernels* distribution[5];  // indexed by Distribution
   void (*philox)(const PhiloxTile& tile);
   std::size_t vector_lanes;
 };
 
 // The kernels of an available target (target.h), full vectors or one lane wide.
 const KernelTable& kernels(Target target, bool one_lane);
+
+// A batch's kernel, null where the composition has none. `affine`: mean slopes or correlations are given.
+Kernel find_kernel(const KernelTable& table, Operation operation, const Model& model, Sampler sampler, bool affine);
 
 }  // namespace facetwise

@@ -6,19 +6,34 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "facetwise/column.h"
 #include "facetwise/model.h"
 
 namespace facetwise {
 
-//   operation            reads                            writes on request (Batch::out)
-//   sample_normal        incident alpha random            normal incident_dot_normal pdf [1/sr of m] status
-//   sample_reflection    incident alpha random            outgoing normal incident_dot_normal pdf weight status
-//   pdf_reflection       incident alpha outgoing          pdf status
-//   evaluate_reflection  incident alpha outgoing          value status
-//   evaluate_and_pdf     incident alpha outgoing          value pdf status
-//   masking              incident alpha                   masking projected_area share_unoccluded status
+//   operation              reads                             writes on request (Batch::out)
+//   sample_normal          incident roughness random         normal incident_dot_normal pdf [1/sr of m] status
+//   sample_reflection      incident roughness random         outgoing normal incident_dot_normal pdf weight status
+//   pdf_reflection         incident roughness outgoing       pdf status
+//   evaluate_reflection    incident roughness outgoing       value status
+//   evaluate_and_pdf       incident roughness outgoing       value pdf status
+//   masking                incident roughness                masking projected_area share_unoccluded status
+//   sample_transmission    incident roughness random         outgoing normal incident_dot_normal pdf weight eta_scale
+//                                                            status
+//   evaluate_transmission  incident roughness outgoing       value pdf status
+//   sample_scattering      incident roughness random         the same, event branch_probability
+//   evaluate_scattering    incident roughness outgoing       value pdf branch_probability status
+//
+// "roughness" is alpha and, as far as given, mean_slope and slope_correlation. Operations also read what the
+// model's interface needs: f0, f90 (Schlick) or eta (dielectric).
+//
+// With a dielectric, *_reflection and *_transmission force the event: each microfacet reflects, or transmits,
+// whatever its Fresnel reflectance F, which is then part of weight and value alone. *_scattering choose between
+// the two by u3, in proportion to F v_R and (1 - F) v_T where v_R, v_T say whether the direction would be
+// accepted; the pdf has that probability as a factor. evaluate_scattering answers for both sides: o_z > 0 is
+// reflection, o_z < 0 transmission.
 enum class Operation : std::uint8_t {
   sample_normal = 0,
   sample_reflection = 1,
@@ -26,6 +41,10 @@ enum class Operation : std::uint8_t {
   evaluate_reflection = 3,
   evaluate_and_pdf = 4,
   masking = 5,
+  sample_transmission = 6,
+  evaluate_transmission = 7,
+  sample_scattering = 8,
+  evaluate_scattering = 9,
 };
 
 std::string_view name(Operation);
@@ -68,7 +87,14 @@ struct Batch {
   Direction incident{};                  // i
   Direction outgoing{};                  // o, for queries
   Column<float> alpha_x{}, alpha_y{};    // roughness, [1e-4, 10]
-  Column<float> u1{}, u2{}, u3{};        // uniform in [0, 1); u3 only for samplers that use it
+  // Optional, where the model takes them (else 0). Mean slope of the normals (LEADR: Dupuy et al. 2013; Heitz &
+  // d'Eon 2014, section 4), and the correlation rho in (-1, 1) that makes the slopes' covariance proportional to
+  // [[ax^2, rho ax ay], [rho ax ay, ay^2]]. Smith masking with ggx, beckmann or table.
+  Column<float> mean_slope_x{}, mean_slope_y{};  // [-100, 100]
+  Column<float> slope_correlation{};
+  Column<float> eta{};                   // eta_o / eta_i, i's side below; dielectric
+  Column<float> f0{}, f90{};             // Schlick; f90 is optional, else 1
+  Column<float> u1{}, u2{}, u3{};        // uniform in [0, 1); u3 only where uses_u3() and for sample_scattering
   std::optional<Generator> generator{};  // instead of u1, u2, u3
 
   struct Outputs {
@@ -76,12 +102,16 @@ struct Batch {
     OutputDirection normal{};                   // m
     OutputColumn<float> incident_dot_normal{};  // i.m
     OutputColumn<float> pdf{};                  // 1/sr, of o (of m for sample_normal)
-    OutputColumn<float> weight{};               // f cos(theta_o) / pdf with F = 1
-    OutputColumn<float> value{};                // f cos(theta_o) with F = 1, 1/sr
+    OutputColumn<float> weight{};               // f |cos(theta_o)| / pdf
+    OutputColumn<float> value{};                // f |cos(theta_o)|, 1/sr
     OutputColumn<float> masking{};              // G1(i), 0 for i_z <= 0
     OutputColumn<float> projected_area{};       // sigma(i)
     OutputColumn<float> share_unoccluded{};     // K/sigma: share of visible normals whose reflection is not
-                                                // occluded, the share that `cap` keeps
+                                                // occluded, the share that `cap` keeps; GGX with Smith
+    OutputColumn<float> branch_probability{};   // of the event that was chosen, or that o means
+    OutputColumn<float> eta_scale{};            // 1 for a reflection; for a transmission eta^2 (radiance) or 1: what
+                                                // a path divides its weight by to compare it with others'
+    OutputColumn<std::uint8_t> event{};         // Event
     OutputColumn<std::uint8_t> status{};        // LaneStatus
   } out{};
 };
@@ -100,14 +130,27 @@ struct InputField {
   std::string_view name;  // "incident.x", "alpha_x", "u1", ...
   Column<float>& (*column)(Batch&);
   unsigned operations;
+  std::optional<float> otherwise;  // what a missing column means; nothing where it may not be missing
 };
 struct OutputField {
   std::string_view name;  // "out.outgoing.x", "out.pdf", ...
   OutputColumn<float>& (*column)(Batch&);
   unsigned operations;
 };
+
+// The samplers that a model has for an operation, whatever columns are given; empty where the model itself makes no sense
+// or the operation draws nothing.
+std::vector<Sampler> samplers_for(Operation, const Model&);
+
 std::span<const InputField> input_fields();
 std::span<const OutputField> output_fields();
+// Byte columns, one value per lane: status and event.
+struct ByteField {
+  std::string_view name;  // "out.status", "out.event"
+  OutputColumn<std::uint8_t>& (*column)(Batch&);
+  unsigned operations;
+};
+std::span<const ByteField> byte_fields();
 constexpr unsigned bit(Operation operation) { return 1u << static_cast<unsigned>(operation); }
 
 }  // namespace facetwise

@@ -1,0 +1,134 @@
+// Which models, samplers and operations fit together: those for which there is a kernel.
+#include "src/composition.h"
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "facetwise/target.h"
+#include "src/tile.h"
+
+namespace facetwise {
+namespace {
+
+absl::Status invalid(absl::string_view field, absl::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat(field, ": ", what));
+}
+
+absl::string_view view(std::string_view text) { return {text.data(), text.size()}; }
+
+template <class T>
+absl::string_view named(T value) {
+  return view(name(value));
+}
+
+bool reads_sampler(Operation operation) {
+  return operation != Operation::evaluate_reflection && operation != Operation::masking;
+}
+
+bool scatters(Operation operation) { return operation >= Operation::sample_transmission; }
+
+const SurfaceKernels& surface_of(const DistributionKernels& kernels, Masking masking, bool affine) {
+  if (masking == Masking::vcavity) return kernels.vcavity;
+  return affine ? kernels.smith_affine : kernels.smith;
+}
+
+const DistributionKernels& kernels_of(Distribution distribution) {
+  return *kernels(*resolve(Target::best), false).distribution[static_cast<std::size_t>(distribution)];
+}
+
+std::string model_name(const Model& model) {
+  return absl::StrCat(named(model.distribution), " with ", named(model.masking), " masking");
+}
+
+std::string names_of(const std::vector<Sampler>& samplers) {
+  return absl::StrJoin(samplers, ", ", [](std::string* out, Sampler sampler) { absl::StrAppend(out, named(sampler)); });
+}
+
+std::vector<Sampler> samplers_for(Operation operation, const Model& model, bool affine) {
+  std::vector<Sampler> samplers;
+  const KernelTable& table = kernels(*resolve(Target::best), false);
+  for (const Sampler sampler : all_samplers())
+    if (reads_sampler(operation) && find_kernel(table, operation, model, sampler, affine)) samplers.push_back(sampler);
+  return samplers;
+}
+
+}  // namespace
+
+bool is_affine(const Batch& batch) {
+  return batch.mean_slope_x.present() || batch.mean_slope_y.present() || batch.slope_correlation.present();
+}
+
+bool samples(Operation operation) {
+  return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
+         operation == Operation::sample_transmission || operation == Operation::sample_scattering;
+}
+
+bool reads_u3(Operation operation, const Batch& batch) {
+  return samples(operation) && (uses_u3(batch.model, batch.sampler) || operation == Operation::sample_scattering);
+}
+
+Kernel find_kernel(const KernelTable& table, Operation operation, const Model& model, Sampler sampler, bool affine) {
+  const SurfaceKernels& surface =
+      surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine);
+  const auto index = static_cast<std::size_t>(sampler);
+  switch (operation) {
+    case Operation::sample_normal: return samples_normals(sampler) ? surface.sample[index] : nullptr;
+    case Operation::sample_reflection: return surface.sample[index];
+    case Operation::pdf_reflection:
+    case Operation::evaluate_and_pdf: return surface.query[index];
+    case Operation::evaluate_reflection: return surface.query[static_cast<std::size_t>(Sampler::visible)];
+    case Operation::masking: return surface.masking;
+    case Operation::sample_transmission:
+    case Operation::sample_scattering: return surface.scatter[index];
+    case Operation::evaluate_transmission:
+    case Operation::evaluate_scattering: return surface.scatter_query[index];
+  }
+  return nullptr;
+}
+
+std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
+  return samplers_for(operation, model, false);
+}
+
+absl::Status check_composition(Operation operation, const Batch& batch) {
+  const Model& model = batch.model;
+  if (operation > Operation::evaluate_scattering) return invalid("operation", "unknown value");
+  if (model.distribution > Distribution::table) return invalid("model.distribution", "unknown value");
+  if (model.masking > Masking::vcavity) return invalid("model.masking", "unknown value");
+  if (model.shadowing > Shadowing::uncorrelated) return invalid("model.shadowing", "unknown value");
+  if (model.normalisation > Normalisation::biased) return invalid("model.normalisation", "unknown value");
+  if (model.interface > Interface::dielectric) return invalid("model.interface", "unknown value");
+  if (model.transport > Transport::importance) return invalid("model.transport", "unknown value");
+  if (batch.sampler > Sampler::visible) return invalid("sampler", "unknown value");
+
+  const DistributionKernels& distribution = kernels_of(model.distribution);
+  const bool affine = is_affine(batch);
+  if (!surface_of(distribution, model.masking, false).masking)
+    return invalid("model.masking", absl::StrCat(named(model.distribution), " has no projected area in closed form, which ",
+                                                 "Smith needs; it takes vcavity, or a table of it"));
+  const bool table = model.distribution == Distribution::table;
+  if (table != (model.table != nullptr))
+    return invalid("model.table", table ? "missing: the distribution `table` needs it"
+                                        : "given, but the distribution is not `table`");
+  if (scatters(operation) && model.interface != Interface::dielectric)
+    return invalid("model.interface", absl::StrCat(named(operation), " needs a dielectric; this is a ",
+                                                   named(model.interface), " one, which transmits nothing"));
+  if (affine && !surface_of(distribution, model.masking, true).masking) {
+    const absl::string_view field = batch.mean_slope_x.present()   ? "mean_slope_x"
+                                    : batch.mean_slope_y.present() ? "mean_slope_y"
+                                                                   : "slope_correlation";
+    return invalid(field, absl::StrCat(model_name(model), " does not take it; ggx, beckmann and table with smith do"));
+  }
+  if (model.retro && (batch.mean_slope_x.present() || batch.mean_slope_y.present()))
+    return invalid("model.retro", "needs normals that are distributed symmetrically about n: not with a mean slope");
+
+  if (!reads_sampler(operation)) return absl::OkStatus();
+  const KernelTable& kernel_table = kernels(*resolve(Target::best), false);
+  if (find_kernel(kernel_table, operation, model, batch.sampler, affine)) return absl::OkStatus();
+  const char* with = !affine ? "" : batch.slope_correlation.present() ? " and correlated roughness" : " and a mean slope";
+  return invalid("sampler", absl::StrCat(named(batch.sampler), " does not fit ", named(operation), " of ", model_name(model),
+                                         with, "; what does: ", names_of(samplers_for(operation, model, affine))));
+}
+
+}  // namespace facetwise
