@@ -89,7 +89,7 @@ void make_plan(Operation operation, const Batch& batch, const KernelTable& table
   plan.tile.normals_alone = operation == Operation::sample_normal;
   plan.tile.transmits = operation == Operation::sample_transmission || operation == Operation::evaluate_transmission;
   plan.tile.uncorrelated = model.shadowing == Shadowing::uncorrelated;
-  plan.tile.biased = model.normalisation == Normalisation::biased;
+  plan.tile.biased = model.normalisation == Normalisation::biased && operation != Operation::masking;
   plan.tile.importance = model.transport == Transport::importance;
   plan.tile.retro = model.retro;
   plan.tile.interface = model.interface;
@@ -102,10 +102,11 @@ class Stage {
  public:
   explicit Stage(const Plan& plan) : plan_(plan), tile_(plan.tile) {
     for (std::size_t c = 0; c < plan.one_value_count; ++c) {
-      const auto& [k, column] = plan.one_value[c];
-      std::fill_n(in_[k], kStaged, *column->data());
+      const auto& [k, value] = plan.one_value[c];
+      std::fill_n(in_[k], kStaged, value);
       tile_.in[k] = in_[k];
     }
+    tile_.event = bytes_[kOutEvent];
     for (float*& out : tile_.out) out = unwanted_;
   }
 

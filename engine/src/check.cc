@@ -85,9 +85,9 @@ absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& a
 
 namespace {
 
-// Whether the operation reads a column that it knows, with this model: a column is missing where it does, and one too
+// Whether a model reads a column that the operation knows: a column is missing where it does, and one too
 // many where it does not.
-bool reads(Operation operation, const Batch& batch, std::size_t input) {
+bool reads(const Batch& batch, std::size_t input) {
   const Interface interface = batch.model.interface;
   switch (input) {
     case kEta: return interface == Interface::dielectric;
@@ -105,7 +105,7 @@ absl::Status check_inputs(Operation operation, const Batch& batch, const BatchCo
     if (!known && !column.present()) continue;
     const absl::string_view field = view(fields[k].name);
     const bool random = k >= kU1;
-    const bool read = reads(operation, batch, k);
+    const bool read = reads(batch, k);
     if (!column.present()) {
       const bool needed = read && !fields[k].otherwise && !(random && batch.generator) &&
                           !(k == kU3 && !reads_u3(operation, batch));
@@ -155,7 +155,7 @@ absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
     MemoryUse memory;
   };
   static constexpr std::string_view kId = "generator.id", kActive = "active";
-  Use inputs[kInputs + 2], outputs[kOutputs + kByteOutputs];
+  Use inputs[kInputs + 2], outputs[std::size_t{kOutputs} + kByteOutputs];
   std::size_t input_count = 0, output_count = 0;
   for (std::size_t k = 0; k < kInputs; ++k)
     if (columns.in[k]->present())

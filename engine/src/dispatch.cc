@@ -10,50 +10,29 @@
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
 
 #include "hwy/highway.h"
-#include "src/kernels/operations-inl.h"
+#include "src/distributions.h"
 #include "src/math/philox-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class Sampler, bool kNormal>
-constexpr Kernel SampleKernel() {
-  return ForEachVector<D, Sample<D, Sampler, kNormal>>;
-}
-template <class D, class Sampler, bool kValue, bool kPdf>
-constexpr Kernel QueryKernel() {
-  return ForEachVector<D, Query<D, Sampler, kValue, kPdf>>;
-}
-
-// D: the tag of one vector. Two: that of the sampler with the longest chain, which gains by 15 % from pairs;
-// the others lose up to 9 % by them where registers are few.
-template <class D, class Two>
-constexpr KernelTable MakeTable() {
-  return {
-      .sample_normal = {SampleKernel<D, Ndf, true>(), SampleKernel<D, Heitz, true>(), SampleKernel<D, Cap, true>(),
-                        nullptr, nullptr},
-      .sample_reflection = {SampleKernel<D, Ndf, false>(), SampleKernel<D, Heitz, false>(),
-                            SampleKernel<D, Cap, false>(), SampleKernel<D, Bounded, false>(),
-                            SampleKernel<Two, Exact, false>()},
-      // heitz and cap have one density.
-      .pdf_reflection = {QueryKernel<D, Ndf, false, true>(), QueryKernel<D, Cap, false, true>(),
-                         QueryKernel<D, Cap, false, true>(), QueryKernel<D, Bounded, false, true>(),
-                         QueryKernel<D, Exact, false, true>()},
-      .evaluate_reflection = QueryKernel<D, Cap, true, false>(),
-      .evaluate_and_pdf = {QueryKernel<D, Ndf, true, true>(), QueryKernel<D, Cap, true, true>(),
-                           QueryKernel<D, Cap, true, true>(), QueryKernel<D, Bounded, true, true>(),
-                           QueryKernel<D, Exact, true, true>()},
-      .masking = ForEachVector<D, MaskingOf<D>>,
-      .philox = Philox<D>,
-      .vector_lanes = hn::MaxLanes(D()),
-  };
-}
+#define FACETWISE_DECLARE(Name)             \
+  extern const DistributionKernels k##Name; \
+  extern const DistributionKernels kOneLane##Name;
+FACETWISE_DISTRIBUTIONS(FACETWISE_DECLARE)
+#undef FACETWISE_DECLARE
 
 extern const KernelTable kTable;
 extern const KernelTable kOneLaneTable;
-const KernelTable kTable = MakeTable<hn::ScalableTag<float>, Twice<hn::ScalableTag<float>>>();
-const KernelTable kOneLaneTable = MakeTable<hn::CappedTag<float, 1>, hn::CappedTag<float, 1>>();
+#define FACETWISE_ENTRY(Name) &k##Name,
+const KernelTable kTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)},
+                            Philox<hn::ScalableTag<float>>,
+                            hn::MaxLanes(hn::ScalableTag<float>())};
+#undef FACETWISE_ENTRY
+#define FACETWISE_ENTRY(Name) &kOneLane##Name,
+const KernelTable kOneLaneTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1};
+#undef FACETWISE_ENTRY
 
 }  // namespace HWY_NAMESPACE
 }  // namespace facetwise

@@ -91,7 +91,7 @@ struct DistributionKernels {
 };
 
 struct KernelTable {
-  const DistributionKernels* distribution[5];  // indexed by Distribution
+  const DistributionKernels* distribution[5];  // indexed by Distribution; null at the end where there are no more
   void (*philox)(const PhiloxTile& tile);
   std::size_t vector_lanes;
 };

@@ -24,20 +24,21 @@ struct Cone {
   using V = Vec<D>;
   HWY_INLINE Cone() {}
   V lambda;                  // the form's positive eigenvalue
+  V g;                       // w.v; lambda itself without a mean slope
   V px, py;                  // i_z ax^2, i_z ay^2
   V inverse_p, inverse_q;    // 1/P, 1/Q: P = lambda + px, Q = lambda + py
   V vx, vy;                  // the axis (v_x, v_y, 1)
   V inverse_n2;              // 1 / v.v
-  V two_k;                   // 2 K = 2 lambda^2 / (n2 sqrt(P Q))
+  V two_k;                   // 2 K = 2 lambda g / (n2 sqrt(P Q))
 };
 
-// One Halley step for the root of f(l) = l - i_z - w_x^2 / P - w_y^2 / Q, given 1/P and 1/Q at l. `ratio` is about
+// One Halley step for the root of f(l) = l - h - x2 / P - y2 / Q, given 1/P and 1/Q at l. `ratio` is about
 // 1 / f', and f' is v.v.
 template <class D, class V = Vec<D>>
-HWY_INLINE V HalleyStep(D d, const Incident<D>& i, V l, V inverse_p, V inverse_q, V& ratio) {
-  const V x = i.wx * i.wx * inverse_p, y = i.wy * i.wy * inverse_q;
+HWY_INLINE V HalleyStep(D d, V h, V x2, V y2, V l, V inverse_p, V inverse_q, V& ratio) {
+  const V x = x2 * inverse_p, y = y2 * inverse_q;
   const V x1 = x * inverse_p, y1 = y * inverse_q;
-  const V f = l - i.z - (x + y);
+  const V f = l - h - (x + y);
   const V f1 = x1 + y1 + Set(d, 1.0f);
   const V f2 = Fma(x1, inverse_p, y1 * inverse_q);  // minus half the second derivative
   ratio = f1 / Fma(f1, f1, f * f2);
@@ -69,7 +70,8 @@ template <class D>
 struct Roughness {
   Mask<D> isotropic, rough;
   bool all_isotropic, any_isotropic, any_rough;
-  HWY_INLINE Roughness(D d, const Incident<D>& i)
+  template <class I>
+  HWY_INLINE Roughness(D d, const I& i)
       : isotropic(i.ax == i.ay),
         rough(Max(i.ax, i.ay) > Set(d, 1.0f)),
         all_isotropic(AllTrue(d, isotropic)),
@@ -79,8 +81,8 @@ struct Roughness {
 
 // The positive root of f for isotropic roughness, alpha^2 i_z = mean: (i_z - mean + root) / 2, or its conjugate
 // where i_z < mean, that is for alpha > 1. Otherwise, with the mean of the two, a lower bound.
-template <class D, class V = Vec<D>>
-HWY_INLINE V StartLambda(D d, const Incident<D>& i, const Roughness<D>& roughness, V mean) {
+template <class D, class I, class V = Vec<D>>
+HWY_INLINE V StartLambda(D d, const I& i, const Roughness<D>& roughness, V mean) {
   const V sum = i.z + mean, difference = i.z - mean;
   const V two_a = i.a + i.a;
   const V root = Sqrt(Fma(sum, sum, two_a + two_a));
@@ -94,8 +96,8 @@ HWY_INLINE V StartLambda(D d, const Incident<D>& i, const Roughness<D>& roughnes
   return lambda;
 }
 
-template <class D, class V = Vec<D>>
-HWY_INLINE void MakeCone(D d, const Incident<D>& i, const Roughness<D>& roughness, Cone<D>& cone) {
+template <class D, class I, class V = Vec<D>>
+HWY_INLINE void MakeCone(D d, const I& i, const Roughness<D>& roughness, Cone<D>& cone) {
   const V one = Set(d, 1.0f);
   cone.px = i.z * (i.ax * i.ax);
   cone.py = cone.px;
@@ -118,8 +120,9 @@ HWY_INLINE void MakeCone(D d, const Incident<D>& i, const Roughness<D>& roughnes
   V ratio = one;
   if (!roughness.all_isotropic) {
     // The start is wrong by 1.7 % at most for alpha up to 1; then one step leaves 7.5e-7.
+    const V x2 = i.wx * i.wx, y2 = i.wy * i.wy;
     const V isotropic_lambda = lambda, start_p = cone.inverse_p, start_q = cone.inverse_q;
-    lambda = HalleyStep(d, i, lambda, cone.inverse_p, cone.inverse_q, ratio);
+    lambda = HalleyStep(d, i.z, x2, y2, lambda, cone.inverse_p, cone.inverse_q, ratio);
     p = lambda + cone.px;
     q = lambda + cone.py;
     cone.inverse_p = RefineReciprocal(d, p, cone.inverse_p);
@@ -130,7 +133,7 @@ HWY_INLINE void MakeCone(D d, const Incident<D>& i, const Roughness<D>& roughnes
       for (const auto& lanes : {roughness.rough, rougher}) {
         const V inverse = one / (p * q);
         V unused;
-        lambda = Select(lanes, HalleyStep(d, i, lambda, q * inverse, p * inverse, unused), lambda);
+        lambda = Select(lanes, HalleyStep(d, i.z, x2, y2, lambda, q * inverse, p * inverse, unused), lambda);
         p = lambda + cone.px;
         q = lambda + cone.py;
       }
@@ -147,6 +150,7 @@ HWY_INLINE void MakeCone(D d, const Incident<D>& i, const Roughness<D>& roughnes
   }
 
   cone.lambda = lambda;
+  cone.g = lambda;
   cone.vx = i.wx * cone.inverse_p;
   cone.vy = i.wy * cone.inverse_q;
   const V n2 = Fma(cone.vx, cone.vx, Fma(cone.vy, cone.vy, one));
@@ -160,25 +164,105 @@ HWY_INLINE void MakeCone(D d, const Incident<D>& i, const Roughness<D>& roughnes
   cone.two_k = (lambda + lambda) * lambda * (cone.inverse_n2 * inverse_root);
 }
 
+// With a mean slope the form's matrix is diag(-i_z ax^2, -i_z ay^2, h) bordered by q. Where h < 0 the isotropic root
+// may not be positive; the form's value at the half vector of i and n is a second lower bound. Started at the larger
+// one, 10 steps leave 1e-7; most lanes stop after one.
+template <class D, class I, class V = Vec<D>>
+HWY_INLINE void MakeAffineCone(D d, const I& i, Cone<D>& cone) {
+  const V one = Set(d, 1.0f), tiny = Set(d, kSmallestA);
+  // Lanes behind the surface do not use the cone.
+  const V z = Select(i.front, Max(i.z, Set(d, 0x1p-60f)), one);
+  const V qx = i.ax * Fma(z, i.mean_x, i.x), qy = i.ay * Fma(z, i.mean_y, i.y);
+  const V slope2 = Fma(i.mean_x, i.mean_x, i.mean_y * i.mean_y);
+  // 2 z' - i_z (1 + mean^2) = i_z (1 - mean^2) - 2 mean.i
+  const V along = Fma(i.mean_x, i.x, i.mean_y * i.y);
+  const V h = NegFma(z, slope2, z) - (along + along);
+  cone.px = z * (i.ax * i.ax);
+  cone.py = z * (i.ay * i.ay);
+  const V x2 = qx * qx, y2 = qy * qy, qq = x2 + y2;
+  const V mean = Fma(x2, cone.px, y2 * cone.py) / Max(qq, tiny);
+  const V sum = h + mean, difference = h - mean;
+  const V two_q = qq + qq;
+  const V root = Sqrt(Fma(sum, sum, two_q + two_q));
+  const V product = Fma(h, mean, qq);
+  const V isotropic = Select(difference < Zero(d), (product + product) / Max(root - difference, tiny),
+                             Set(d, 0.5f) * (difference + root));
+  const V up = z + one;
+  const V mx = Fma(i.mean_x, up, i.x) / i.ax, my = Fma(i.mean_y, up, i.y) / i.ay;
+  const V rayleigh = (up + up) / Dot(mx, my, up, mx, my, up);
+  V l = Max(isotropic, rayleigh);
+  auto active = l > Zero(d);
+  for (int step = 0; step < 10 && !AllFalse(d, active); ++step) {
+    const V p = l + cone.px, q = l + cone.py;
+    const V inverse = one / (p * q);
+    V unused;
+    const V next = HalleyStep(d, h, x2, y2, l, q * inverse, p * inverse, unused);
+    const auto moves = Abs(next - l) > l * Set(d, 1e-7f);
+    l = Select(And(active, next > Zero(d)), next, l);
+    active = And(active, moves);
+  }
+  const V p = l + cone.px, q = l + cone.py;
+  cone.lambda = l;
+  cone.inverse_p = one / p;
+  cone.inverse_q = one / q;
+  cone.vx = qx * cone.inverse_p;
+  cone.vy = qy * cone.inverse_q;
+  cone.inverse_n2 = one / Fma(cone.vx, cone.vx, Fma(cone.vy, cone.vy, one));
+  cone.g = Max(Dot(i.wx, i.wy, i.wz, cone.vx, cone.vy, one), tiny);
+  cone.two_k = (l + l) * cone.g * (cone.inverse_n2 * Sqrt(cone.inverse_p * cone.inverse_q));
+}
+
+template <class D, class I>
+HWY_INLINE void MakeConeOf(D d, const I& i, const Roughness<D>& roughness, Cone<D>& cone) {
+  if constexpr (I::Surface::kAffine) {
+    MakeAffineCone(d, i, cone);
+  } else {
+    MakeCone(d, i, roughness, cone);
+  }
+}
+
+// K / sigma(i).
+template <class D, class I, class V = Vec<D>>
+HWY_INLINE V ConeShare(D d, const I& i) {
+  const V one = Set(d, 1.0f);
+  Cone<D> cone;
+  MakeConeOf(d, i, Roughness<D>(d, i), cone);
+  return Select(i.front, Min(cone.two_k / i.t, one), one);
+}
+
 struct Exact {
   static constexpr bool kUnit = false;
   static constexpr bool kUsesU3 = true;
   static constexpr bool kVisible = true;
   static constexpr bool kNIsSigma = false;
+  static constexpr bool kShifted = true;
   static constexpr bool kExact = true;
+  static constexpr bool kNormals = false;
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D d, const Incident<D>& i, V, V) {
-    Cone<D> cone;
-    MakeCone(d, i, Roughness<D>(d, i), cone);
-    return Select(i.front, cone.two_k, i.t);
+  // m_hat is of unit length in front, else a half vector.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Density(D d, const I& i, const Drawn<D>& drawn, V rho, V& numerator, V& denominator) {
+    const V one = Set(d, 1.0f);
+    numerator = drawn.mm * drawn.mm;
+    denominator = one;
+    if (!i.all_front) {
+      numerator = Select(i.front, numerator, one);
+      denominator = Select(i.front, one, rho * rho);
+    }
   }
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V u3, Drawn<D>& drawn) {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V TwoN(D d, const I& i, V, V, V, V) {
+    Cone<D> cone;
+    MakeConeOf(d, i, Roughness<D>(d, i), cone);
+    return Select(i.front, cone.two_k, i.tn);
+  }
+
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V u3, Drawn<D>& drawn) {
     const Roughness<D> roughness(d, i);
     Cone<D> cone;
-    MakeCone(d, i, roughness, cone);
+    MakeConeOf(d, i, roughness, cone);
     const V rim = Set(d, kRim);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
@@ -187,7 +271,7 @@ struct Exact {
     const V lambda_u = cone.lambda * u1;
     const V rp = Sqrt(lambda_u * cone.inverse_p);
     V rq = rp;
-    if (!roughness.all_isotropic) rq = Sqrt(lambda_u * cone.inverse_q);
+    if (I::Surface::kAffine || !roughness.all_isotropic) rq = Sqrt(lambda_u * cone.inverse_q);
     const V xi = rp * cos, eta = rq * sin;
     const V along = Fma(xi, cone.vx, eta * cone.vy);
     const V y = Neg(along * cone.inverse_n2);
@@ -200,14 +284,14 @@ struct Exact {
 
     // The sample or its mirror image about the axis, in proportion to w.m_hat.
     const V across = Fma(xi, i.wx, eta * i.wy);
-    const V g_zeta = cone.lambda * zeta;
-    const V threshold = Fma(cone.lambda, y, across) + g_zeta;
+    const V g_zeta = cone.g * zeta;
+    const V threshold = Fma(cone.g, y, across) + g_zeta;
     const auto mirrored = u3 * (g_zeta + g_zeta) >= threshold;
     const V sign = IfThenElseZero(mirrored, SignBit(d));
     const V hz = Max(zeta + Xor(y, sign), rim);
     const V hx = Fma(hz, cone.vx, Xor(xi, sign)), hy = Fma(hz, cone.vy, Xor(eta, sign));
     Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
+    drawn.im = Max(Dot(i.wx, i.wy, i.wz, hx, hy, hz), Set(d, kSmallestIm));
     drawn.two_n = cone.two_k;
 
     // Behind, nothing is occluded: the cap.

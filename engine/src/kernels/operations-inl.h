@@ -9,7 +9,8 @@
 
 #include <bit>
 
-#include "src/kernels/exact-inl.h"
+#include "src/kernels/fresnel-inl.h"
+#include "src/kernels/samplers-inl.h"
 #include "src/tile.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -34,9 +35,9 @@ HWY_INLINE Mask<D> InUnitInterval(D d, V u) {
 }
 
 template <class D, class V = Vec<D>>
-HWY_INLINE Policy<D> Classify(D d, Mask<D> inputs_valid, V ax, V ay) {
+HWY_INLINE Policy<D> Classify(D d, Mask<D> inputs_valid, V ax, V ay, float largest_alpha) {
   // Min and Max of different instruction sets treat NaN differently, comparisons do not.
-  const V zero = Zero(d), largest = Set(d, kLargestAlpha), smallest = Set(d, kSmallestAlpha);
+  const V zero = Zero(d), largest = Set(d, largest_alpha), smallest = Set(d, kSmallestAlpha);
   const auto alpha_valid = And(And(ax > zero, ay > zero), And(ax <= largest, ay <= largest));
   Policy<D> policy;
   policy.valid = And(inputs_valid, alpha_valid);
@@ -54,11 +55,11 @@ class QuickTest {
   HWY_INLINE QuickTest(D d, V x, V y, V z) : d_(d), worst_(UnitVectorError(d, x, y, z)) {}
   HWY_INLINE void UnitVector(V x, V y, V z) { worst_ = Max(worst_, UnitVectorError(d_, x, y, z)); }
   HWY_INLINE void Uniform(V u) { worst_ = Max(worst_, BitCast(DU(), u)); }
-  HWY_INLINE bool AllOrdinary(V ax, V ay) const {
+  HWY_INLINE bool AllOrdinary(V ax, V ay, float largest_alpha) const {
     const DU du;
     const auto smallest = Set(du, Bits(kSmallestAlpha));
     const auto alpha = Max(BitCast(du, ax) - smallest, BitCast(du, ay) - smallest);
-    const auto alpha_limit = Set(du, Bits(kLargestAlpha) - Bits(kSmallestAlpha));
+    const auto alpha_limit = Set(du, Bits(largest_alpha) - Bits(kSmallestAlpha));
     const auto limit = Set(du, kLargestBelowOne);
     return AllTrue(du, And(Min(alpha, alpha_limit) == alpha, Min(worst_, limit) == worst_));
   }
@@ -124,25 +125,81 @@ class Exceptions {
   Policy<D> policy_;
 };
 
-// What every operation reads.
-template <class D>
+// What every operation reads of a surface S. Directions are in its principal frame.
+template <class D, class S>
 struct Inputs {
   using V = Vec<D>;
+  static constexpr float kLargestRoughness = S::Distribution::kLargestRoughness;
   V x, y, z, ax, ay;
+  V mean_x, mean_y, correlation;  // if the surface is affine
+  Rotation<D> rotation;
 
   HWY_INLINE Inputs(D d, const Tile& tile, std::size_t lane)
       : x(LoadU(d, tile.in[kIx] + lane)),
         y(LoadU(d, tile.in[kIy] + lane)),
         z(LoadU(d, tile.in[kIz] + lane)),
         ax(LoadU(d, tile.in[kAlphaX] + lane)),
-        ay(LoadU(d, tile.in[kAlphaY] + lane)) {}
+        ay(LoadU(d, tile.in[kAlphaY] + lane)) {
+    if constexpr (S::kAffine) {
+      mean_x = LoadU(d, tile.in[kMeanX] + lane);
+      mean_y = LoadU(d, tile.in[kMeanY] + lane);
+      correlation = LoadU(d, tile.in[kCorrelation] + lane);
+      rotation = PrincipalAxes(d, correlation, ax, ay);
+      rotation.In(x, y);
+      rotation.In(mean_x, mean_y);
+    }
+  }
+
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane, const QuickTest<D>& test) const {
+    if (!test.AllOrdinary(ax, ay, kLargestRoughness)) return false;
+    if constexpr (S::kAffine)
+      if (!AllTrue(d, ValidMoments(d))) return false;
+    return tile.interface == Interface::conductor || AllTrue(d, ValidInterface(d, tile, lane));
+  }
+
+  HWY_INLINE Policy<D> Classified(D d, const Tile& tile, std::size_t lane, Mask<D> valid) const {
+    valid = And(valid, UnitLength(d, x, y, z));
+    if constexpr (S::kAffine) valid = And(valid, ValidMoments(d));
+    if (tile.interface != Interface::conductor) valid = And(valid, ValidInterface(d, tile, lane));
+    return Classify(d, valid, ax, ay, kLargestRoughness);
+  }
 
   template <bool kFast>
-  HWY_INLINE Incident<D> Prepared(D d, const Exceptions<D, kFast>& exceptions) const {
-    return Prepare(d, exceptions.Harmless(x, 0.0f), exceptions.Harmless(y, 0.0f), exceptions.Harmless(z, 1.0f),
-                   exceptions.Harmless(ax, 1.0f), exceptions.Harmless(ay, 1.0f));
+  HWY_INLINE Incident<D, S> Prepared(D d, const Tile& tile, const Exceptions<D, kFast>& exceptions) const {
+    V means[2] = {};
+    if constexpr (S::kAffine) {
+      means[0] = exceptions.Harmless(mean_x, 0.0f);
+      means[1] = exceptions.Harmless(mean_y, 0.0f);
+    }
+    return Prepare<S>(d, tile, exceptions.Harmless(x, 0.0f), exceptions.Harmless(y, 0.0f),
+                      exceptions.Harmless(z, 1.0f), exceptions.Harmless(ax, 1.0f), exceptions.Harmless(ay, 1.0f),
+                      means[0], means[1]);
+  }
+
+  // A direction's x and y as loaded, and as stored.
+  HWY_INLINE void In(V& x_, V& y_) const {
+    if constexpr (S::kAffine) rotation.In(x_, y_);
+  }
+  HWY_INLINE void Out(V& x_, V& y_) const {
+    if constexpr (S::kAffine) rotation.Out(x_, y_);
+  }
+
+ private:
+  // Exactly 1 as a correlation is a roughness of 0.
+  HWY_INLINE Mask<D> ValidMoments(D d) const {
+    const V largest = Set(d, 1.5f * kLargestMeanSlope);
+    return And(And(Abs(mean_x) <= largest, Abs(mean_y) <= largest), Abs(correlation) < Set(d, 1.0f));
   }
 };
+
+// Turned about n by half a turn: what retro-reflection does to a reflection. f(i', o) with i' = (-i_x, -i_y, i_z) is
+// f(i, o') as long as the normals are distributed symmetrically.
+template <class D, class V = Vec<D>>
+HWY_INLINE void TurnIfRetro(D d, const Tile& tile, V& x, V& y) {
+  if (!tile.retro) return;
+  x = Xor(x, SignBit(d));
+  y = Xor(y, SignBit(d));
+}
 
 // An operation is a struct that loads its inputs and has Run<kFast>(). Whole vectors of ordinary lanes, nearly
 // all, take the fast way, which knows no exceptions; an ordinary lane's results are the same both ways.
@@ -153,7 +210,7 @@ void ForEachVector(const Tile& given, Statistics& statistics) {
   Statistics counted;
   for (std::size_t lane = 0; lane < tile.lanes; lane += Lanes(d)) {
     const Operation operation(d, tile, lane);
-    if (HWY_LIKELY(operation.AllOrdinary(d) && lane + Lanes(d) <= tile.lanes)) {
+    if (HWY_LIKELY(operation.AllOrdinary(d, tile, lane) && lane + Lanes(d) <= tile.lanes)) {
       operation.template Run<true>(d, tile, lane, counted);
     } else {
       operation.template Run<false>(d, tile, lane, counted);
@@ -162,139 +219,160 @@ void ForEachVector(const Tile& given, Statistics& statistics) {
   statistics += counted;
 }
 
-// sample_reflection and, with kNormal, sample_normal.
-template <class D, class Sampler, bool kNormal>
-struct Sample {
+// What samples read besides.
+template <class D, class S, bool kUsesU3>
+struct SampleInputs : Inputs<D, S> {
   using V = Vec<D>;
-  Inputs<D> in;
   V u1, u2, u3;
 
-  HWY_INLINE Sample(D d, const Tile& tile, std::size_t lane)
-      : in(d, tile, lane), u1(LoadU(d, tile.in[kU1] + lane)), u2(LoadU(d, tile.in[kU2] + lane)), u3(u2) {
-    if constexpr (Sampler::kUsesU3) u3 = LoadU(d, tile.in[kU3] + lane);
+  HWY_INLINE SampleInputs(D d, const Tile& tile, std::size_t lane)
+      : Inputs<D, S>(d, tile, lane), u1(LoadU(d, tile.in[kU1] + lane)), u2(LoadU(d, tile.in[kU2] + lane)), u3(u2) {
+    if constexpr (kUsesU3) u3 = LoadU(d, tile.in[kU3] + lane);
   }
-
-  HWY_INLINE bool AllOrdinary(D d) const {
-    QuickTest<D> test(d, in.x, in.y, in.z);
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
+    QuickTest<D> test(d, this->x, this->y, this->z);
     test.Uniform(u1);
     test.Uniform(u2);
-    if constexpr (Sampler::kUsesU3) test.Uniform(u3);
-    return test.AllOrdinary(in.ax, in.ay);
+    if constexpr (kUsesU3) test.Uniform(u3);
+    return Inputs<D, S>::AllOrdinary(d, tile, lane, test);
   }
+  HWY_INLINE Policy<D> Classified(D d, const Tile& tile, std::size_t lane) const {
+    const auto valid = And(And(InUnitInterval(d, u1), InUnitInterval(d, u2)), InUnitInterval(d, u3));
+    return Inputs<D, S>::Classified(d, tile, lane, valid);
+  }
+};
 
-  HWY_INLINE Policy<D> Classified(D d) const {
-    const auto u_valid = And(And(InUnitInterval(d, u1), InUnitInterval(d, u2)), InUnitInterval(d, u3));
-    return Classify(d, And(UnitLength(d, in.x, in.y, in.z), u_valid), in.ax, in.ay);
-  }
+// sample_reflection and sample_normal.
+template <class D, class S, class Sampler>
+struct Sample {
+  using V = Vec<D>;
+  SampleInputs<D, S, Sampler::kUsesU3> in;
+
+  HWY_INLINE Sample(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const { return in.AllOrdinary(d, tile, lane); }
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
     Policy<D> policy;
-    if constexpr (!kFast) policy = Classified(d);
+    if constexpr (!kFast) policy = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, policy);
-    const Incident<D> i = in.Prepared(d, exceptions);
+    const Incident<D, S> i = in.Prepared(d, tile, exceptions);
 
     Drawn<D> drawn;
-    Sampler::Draw(d, i, exceptions.Harmless(u1, 0.0f), exceptions.Harmless(u2, 0.0f),
-                  exceptions.Harmless(u3, 0.0f), drawn);
+    Sampler::Draw(d, i, exceptions.Harmless(in.u1, 0.0f), exceptions.Harmless(in.u2, 0.0f),
+                  exceptions.Harmless(in.u3, 0.0f), drawn);
 
     // o = 2 (i.M) / (M.M) M - i
     V rho = (drawn.im + drawn.im) / drawn.mm;
     if constexpr (Sampler::kExact) {
-      if (!i.all_front) rho = Select(i.front, rho, Max(rho, Set(d, kSmallestRho)));
+      if (!i.all_front) rho = Select(i.front, rho, Max(rho, Set(d, kSmallestRho<S>)));
     } else if constexpr (!Sampler::kUnit) {
-      rho = Max(rho, Set(d, kSmallestRho));
+      rho = Max(rho, Set(d, kSmallestRho<S>));
     }
-    const V ox = Fms(rho, drawn.mx, i.x), oy = Fms(rho, drawn.my, i.y);
+    V ox = Fms(rho, drawn.mx, i.x), oy = Fms(rho, drawn.my, i.y);
     V oz = Fms(rho, drawn.mz, i.z);
     if constexpr (Sampler::kExact) oz = Max(oz, Set(d, kRim));
 
-    auto occluded = kNormal ? NoLanes(d) : oz <= zero;
+    auto occluded = tile.normals_alone ? NoLanes(d) : oz <= zero;
     if constexpr (!Sampler::kVisible) occluded = Or(occluded, drawn.im <= Set(d, kSmallestIm));
     const auto accepted = Not(occluded);
 
-    // p(o) = D(m) / (4 N), D(m) = (M.M)^2 / (|m_hat|^4 pi ax ay); with a half vector |m_hat|^2 / M.M is rho.
+    // p(o) = D(m) / (4 N)
     V pdf = zero;
     if (tile.wanted & kWantsPdf) {
-      V numerator = one, denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n;
-      if constexpr (Sampler::kUnit) {
-        numerator = drawn.mm * drawn.mm;
-      } else if constexpr (Sampler::kExact) {
-        numerator = drawn.mm * drawn.mm;
-        if (!i.all_front) {
-          numerator = Select(i.front, numerator, one);
-          denominator = denominator * Select(i.front, one, rho * rho);
-        }
-      } else {
-        denominator = denominator * (rho * rho);
-      }
+      V numerator, denominator;
+      Sampler::Density(d, i, drawn, rho, numerator, denominator);
+      denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
       pdf = IfThenElseZero(accepted, numerator / denominator);
     }
 
-    if (kNormal || (tile.wanted & kWantsNormal)) {
+    const bool fresnel = tile.interface != Interface::conductor && (tile.wanted & kWantsWeight);
+    V im = drawn.im;
+    if (fresnel || (tile.wanted & kWantsNormal) || tile.normals_alone) {
       const V inverse_length = one / Sqrt(drawn.mm);
-      V im = drawn.im;
       if constexpr (Sampler::kVisible) im = Max(im, Set(d, kSmallestIm));
       im = im * inverse_length;
-      StoreU(exceptions.Output(drawn.mx * inverse_length, zero), d, tile.out[kOutMx] + lane);
-      StoreU(exceptions.Output(drawn.my * inverse_length, zero), d, tile.out[kOutMy] + lane);
-      StoreU(exceptions.Output(drawn.mz * inverse_length, one), d, tile.out[kOutMz] + lane);
-      StoreU(exceptions.Output(im, in.z), d, tile.out[kOutIm] + lane);
-      if constexpr (kNormal) pdf = pdf * (im * Set(d, 4.0f));  // p(m) = p(o) 4 i.m
+      if (tile.normals_alone) pdf = pdf * (im * Set(d, 4.0f));  // p(m) = p(o) 4 i.m
+      if (tile.wanted & kWantsNormal) {
+        V mx = drawn.mx * inverse_length, my = drawn.my * inverse_length;
+        TurnIfRetro(d, tile, mx, my);
+        in.Out(mx, my);
+        StoreU(exceptions.Output(mx, zero), d, tile.out[kOutMx] + lane);
+        StoreU(exceptions.Output(my, zero), d, tile.out[kOutMy] + lane);
+        StoreU(exceptions.Output(drawn.mz * inverse_length, one), d, tile.out[kOutMz] + lane);
+        StoreU(exceptions.Output(im, in.z), d, tile.out[kOutIm] + lane);
+      }
     }
     StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
 
-    if constexpr (!kNormal) {
+    if (!tile.normals_alone) {
       if (tile.wanted & kWantsWeight) {
-        // f cos(theta_o) = w D / (4 sigma), so the weight is w N / sigma.
-        V lit, all;
-        ShadowingWeight(d, i, ox, oy, oz, tile.uncorrelated, lit, all);
-        if constexpr (!Sampler::kNIsSigma) {
-          lit = lit * drawn.two_n;
-          all = all * i.t;
+        V weight = S::Masking::template Weight<Sampler>(d, i, drawn, ox, oy, oz, tile.uncorrelated);
+        V mirror = one;
+        if (fresnel) {
+          weight = weight * Reflectance(d, tile, lane, im);
+          mirror = Reflectance(d, tile, lane, in.z);
         }
-        const V mirror = IfThenElseZero(in.z > zero, one);
-        StoreU(exceptions.Output(IfThenElseZero(accepted, lit / all), mirror), d, tile.out[kOutWeight] + lane);
+        mirror = IfThenElseZero(in.z > zero, mirror);
+        StoreU(exceptions.Output(IfThenElseZero(accepted, weight), mirror), d, tile.out[kOutWeight] + lane);
       }
-      StoreU(exceptions.Output(ox, Neg(in.x)), d, tile.out[kOutOx] + lane);
-      StoreU(exceptions.Output(oy, Neg(in.y)), d, tile.out[kOutOy] + lane);
+      V mirror_x = Neg(in.x), mirror_y = Neg(in.y);
+      TurnIfRetro(d, tile, ox, oy);
+      TurnIfRetro(d, tile, mirror_x, mirror_y);
+      in.Out(ox, oy);
+      in.Out(mirror_x, mirror_y);
+      StoreU(exceptions.Output(ox, mirror_x), d, tile.out[kOutOx] + lane);
+      StoreU(exceptions.Output(oy, mirror_y), d, tile.out[kOutOy] + lane);
       StoreU(exceptions.Output(oz, in.z), d, tile.out[kOutOz] + lane);
     }
     exceptions.Finish(tile, lane, occluded, statistics);
   }
 };
 
-// pdf_reflection, evaluate_reflection and evaluate_and_pdf.
-template <class D, class Sampler, bool kValue, bool kPdf>
-struct Query {
+// What queries read besides.
+template <class D, class S>
+struct QueryInputs : Inputs<D, S> {
   using V = Vec<D>;
-  Inputs<D> in;
   V ox, oy, oz;
 
-  HWY_INLINE Query(D d, const Tile& tile, std::size_t lane)
-      : in(d, tile, lane),
+  HWY_INLINE QueryInputs(D d, const Tile& tile, std::size_t lane)
+      : Inputs<D, S>(d, tile, lane),
         ox(LoadU(d, tile.in[kOx] + lane)),
         oy(LoadU(d, tile.in[kOy] + lane)),
-        oz(LoadU(d, tile.in[kOz] + lane)) {}
-
-  HWY_INLINE bool AllOrdinary(D d) const {
-    QuickTest<D> test(d, in.x, in.y, in.z);
-    test.UnitVector(ox, oy, oz);
-    return test.AllOrdinary(in.ax, in.ay);
+        oz(LoadU(d, tile.in[kOz] + lane)) {
+    this->In(ox, oy);
   }
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
+    QuickTest<D> test(d, this->x, this->y, this->z);
+    test.UnitVector(ox, oy, oz);
+    return Inputs<D, S>::AllOrdinary(d, tile, lane, test);
+  }
+  HWY_INLINE Policy<D> Classified(D d, const Tile& tile, std::size_t lane) const {
+    return Inputs<D, S>::Classified(d, tile, lane, UnitLength(d, ox, oy, oz));
+  }
+};
+
+// pdf_reflection, evaluate_reflection and evaluate_and_pdf.
+template <class D, class S, class Sampler>
+struct Query {
+  using V = Vec<D>;
+  using Distribution = typename S::Distribution;
+  QueryInputs<D, S> in;
+
+  HWY_INLINE Query(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const { return in.AllOrdinary(d, tile, lane); }
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
     Policy<D> policy;
-    if constexpr (!kFast) {
-      const auto valid = And(UnitLength(d, in.x, in.y, in.z), UnitLength(d, ox, oy, oz));
-      policy = Classify(d, valid, in.ax, in.ay);
-    }
+    if constexpr (!kFast) policy = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, policy);
-    const Incident<D> i = in.Prepared(d, exceptions);
-    const V x = exceptions.Harmless(ox, 0.0f), y = exceptions.Harmless(oy, 0.0f), z = exceptions.Harmless(oz, 1.0f);
+    const Incident<D, S> i = in.Prepared(d, tile, exceptions);
+    V x = exceptions.Harmless(in.ox, 0.0f), y = exceptions.Harmless(in.oy, 0.0f);
+    const V z = exceptions.Harmless(in.oz, 1.0f);
+    TurnIfRetro(d, tile, x, y);
 
     const V hx = i.x + x, hy = i.y + y, hz = i.z + z;
     const V h2 = Dot(hx, hy, hz, hx, hy, hz);
@@ -304,54 +382,57 @@ struct Query {
     // Lanes that no microfacet reaches compute with the half vector (0, 0, 1).
     const V mx = IfThenElseZero(reached, hx), my = IfThenElseZero(reached, hy), mz = Select(reached, hz, one);
     const V m2 = Select(reached, h2, one);
-    const V q = DensityRoot(mx, my, mz, m2, i.ax, i.ay);
-    const V numerator = IfThenElseZero(reached, q * q);
+    // i.h = |h|^2 / 2: the sum i.h cancels where o is nearly -i, this does not.
+    const V im = m2 * Set(d, 0.5f);
+    const V density = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, i.shift));
     const V denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay);
     const V largest = Set(d, 3e38f);  // a density can be beyond the floats straight below a smooth surface
 
-    if constexpr (kPdf) {
-      // i.h = |h|^2 / 2: the sum i.h cancels where o is nearly -i, this does not.
-      const V two_n = Sampler::TwoN(d, i, m2 * Set(d, 0.5f), mz);
+    if (tile.wanted & kWantsPdf) {
+      const V two_n = Sampler::TwoN(d, i, mx, my, mz, im);
+      V numerator = density;
+      if constexpr (Distribution::kShifts && !Sampler::kShifted)
+        if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, zero));
       const V pdf = Min(numerator / (denominator * two_n), largest);
       StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
     }
-    if constexpr (kValue) {
-      V lit, all;
-      ShadowingWeight(d, i, x, y, z, tile.uncorrelated, lit, all);
-      const V value = Min(numerator / (denominator * i.t), largest) * IfThenElseZero(above, lit / all);
+    if (tile.wanted & kWantsValue) {
+      V two_n, w;
+      S::Masking::Value(d, i, mz, im, x, y, z, tile.uncorrelated, two_n, w);
+      V value = Min(density / (denominator * two_n), largest) * IfThenElseZero(above, w);
+      if constexpr (S::Masking::kUnboundedW) value = Min(value, largest);
+      if (tile.interface != Interface::conductor) value = value * Reflectance(d, tile, lane, Sqrt(m2) * Set(d, 0.5f));
       StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
     }
     exceptions.Finish(tile, lane, Not(above), statistics);
   }
 };
 
-template <class D>
+template <class D, class S>
 struct MaskingOf {
   using V = Vec<D>;
-  Inputs<D> in;
+  Inputs<D, S> in;
 
   HWY_INLINE MaskingOf(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
-
-  HWY_INLINE bool AllOrdinary(D d) const { return QuickTest<D>(d, in.x, in.y, in.z).AllOrdinary(in.ax, in.ay); }
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
+    return in.AllOrdinary(d, tile, lane, QuickTest<D>(d, in.x, in.y, in.z));
+  }
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
     Policy<D> policy;
-    if constexpr (!kFast) policy = Classify(d, UnitLength(d, in.x, in.y, in.z), in.ax, in.ay);
+    if constexpr (!kFast) policy = in.Classified(d, tile, lane, Not(NoLanes(d)));
     const Exceptions<D, kFast> exceptions(d, policy);
-    const Incident<D> i = in.Prepared(d, exceptions);
+    const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     // A mirror masks nothing in front of it, and shows nothing to what is behind.
     const V mirror = IfThenElseZero(in.z > zero, one);
-    const V masking = IfThenElseZero(i.front, Min((i.z + i.z) / i.t, one));
+    V masking, area;
+    S::Masking::MaskingAndArea(d, i, masking, area);
     StoreU(exceptions.Output(masking, mirror), d, tile.out[kOutMasking] + lane);
-    StoreU(exceptions.Output(i.t * Set(d, 0.5f), mirror * in.z), d, tile.out[kOutArea] + lane);
-    if (tile.wanted & kWantsShare) {
-      Cone<D> cone;
-      MakeCone(d, i, Roughness<D>(d, i), cone);
-      const V share = Select(i.front, Min(cone.two_k / i.t, one), one);
-      StoreU(exceptions.Output(share, one), d, tile.out[kOutShare] + lane);
-    }
+    StoreU(exceptions.Output(area, mirror * in.z), d, tile.out[kOutArea] + lane);
+    if (tile.wanted & kWantsShare)
+      StoreU(exceptions.Output(S::Masking::Share(d, i), one), d, tile.out[kOutShare] + lane);
     exceptions.Finish(tile, lane, NoLanes(d), statistics);
   }
 };

@@ -1,13 +1,14 @@
-// The published samplers: ndf, heitz, cap, bounded. `exact` has its own file.
+// The published samplers of GGX with Smith masking: ndf, heitz, cap, bounded. `exact` has its own file.
 //
-// A sampler draws m ~ M (any length) from m_hat in the stretched frame, M = (ax m_hat_x, ay m_hat_y, m_hat_z),
-// and says by what N the density is normalised: p(o) = D(m) / (4 N). For visible normals N = sigma(i). Its
-// traits:
-//   kUnit       m_hat is of unit length; else it is a half vector w + nu o_hat, so that |m_hat|^2 = 2 i.M
+// A sampler draws M = L m_hat and says by what N the density is normalised: p(o) = D(m) / (4 N). For visible
+// normals N = sigma(i). Its traits:
+//   kUnit       m_hat is not a half vector w + nu o_hat, for which |m_hat|^2 = 2 i.M
 //   kVisible    i.m > 0 always
 //   kUsesU3     u3 is read
 //   kNIsSigma   N = sigma(i)
-//   kExact      for i_z > 0 no reflection is occluded; m_hat is of unit length there, else a half vector
+//   kShifted    N is times exp(shift), as sigma is (surface-inl.h)
+//   kExact      for i_z > 0 no reflection is occluded; o_z is raised to kRim
+//   kNormals    serves normals and transmission too, not reflections alone
 
 #if defined(FACETWISE_SAMPLERS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_SAMPLERS_INL_H_
@@ -18,6 +19,7 @@
 
 #include "facetwise/model.h"
 #include "src/kernels/ggx-inl.h"
+#include "src/kernels/smith-inl.h"
 #include "src/math/sincos-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -28,7 +30,11 @@ namespace HWY_NAMESPACE {
 inline constexpr float kSmallestIm = 0x1p-84f;
 // rho = 2 i.M / M.M is |m_hat|^2 / M.M for half vectors, at least 1 / (largest alpha)^2. It is kept above half of
 // that where m_hat is so short that i.M is nothing but rounding.
+template <class S>
 inline constexpr float kSmallestRho = 0.5f / (kLargestAlpha * kLargestAlpha);
+// |L| is at most the largest alpha and the longest mean slope and 1.
+template <class Distribution, class Masking>
+inline constexpr float kSmallestRho<Surface<Distribution, Masking, true>> = 0.5f / (160.0f * 160.0f);
 // Likewise m_hat_z (times nu, for half vectors); its square does not underflow.
 inline constexpr float kSmallestZ = 0x1p-62f;
 
@@ -40,39 +46,58 @@ struct Drawn {
   V mm;          // M . M
   V im;          // i . M = w . m_hat
   V two_n;       // 2 N
+  V sx, sy;      // standard slopes, of the samplers that draw them
 };
 
 // Fills in M and M.M from m_hat.
-template <class D, class V = Vec<D>>
-HWY_INLINE void Unstretch(const Incident<D>& i, V hx, V hy, V hz, Drawn<D>& drawn) {
-  drawn.mx = i.ax * hx;
-  drawn.my = i.ay * hy;
+template <class D, class I, class V = Vec<D>>
+HWY_INLINE void Unstretch(const I& i, V hx, V hy, V hz, Drawn<D>& drawn) {
+  Unstretch(i, hx, hy, hz, drawn.mx, drawn.my);
   drawn.mz = hz;
   drawn.mm = Dot(drawn.mx, drawn.my, drawn.mz, drawn.mx, drawn.my, drawn.mz);
 }
 
-// Normals with density D(m) m_z (Walter 2007, Eqs. 35, 36): p(o) = D(m) m_z / (4 |i.m|).
-struct Ndf {
+// pi ax ay D(m), as numerator and denominator: (M.M)^2 / |m_hat|^4. rho = 2 i.M / M.M.
+struct UnitNormals {
   static constexpr bool kUnit = true;
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Density(D d, const I&, const Drawn<D>& drawn, V, V& numerator, V& denominator) {
+    numerator = drawn.mm * drawn.mm;
+    denominator = Set(d, 1.0f);
+  }
+};
+struct HalfVectors {
+  static constexpr bool kUnit = false;
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Density(D d, const I&, const Drawn<D>&, V rho, V& numerator, V& denominator) {
+    numerator = Set(d, 1.0f);
+    denominator = rho * rho;
+  }
+};
+
+// Normals with density D(m) m_z (Walter 2007, Eqs. 35, 36): p(o) = D(m) m_z / (4 |i.m|).
+struct GgxNdf : UnitNormals {
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = false;
   static constexpr bool kNIsSigma = false;
+  static constexpr bool kShifted = false;
   static constexpr bool kExact = false;
+  static constexpr bool kNormals = true;
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D, const Incident<D>&, V im, V mz) {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V TwoN(D, const I&, V, V, V mz, V im) {
     return (im + im) / mz;
   }
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
     const V r = Sqrt(u1);
     const V hx = r * cos, hy = r * sin, hz = Sqrt(Set(d, 1.0f) - u1);
     Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = Dot(i.wx, i.wy, i.z, hx, hy, hz);
-    drawn.two_n = TwoN(d, i, drawn.im, drawn.mz);
+    drawn.im = Dot(i.wx, i.wy, i.wz, hx, hy, hz);
+    drawn.two_n = TwoN(d, i, drawn.mx, drawn.my, drawn.mz, drawn.im);
   }
 };
 
@@ -81,11 +106,13 @@ struct VisibleNormals {
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = true;
   static constexpr bool kNIsSigma = true;
+  static constexpr bool kShifted = true;
   static constexpr bool kExact = false;
+  static constexpr bool kNormals = true;
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D, const Incident<D>& i, V, V) {
-    return i.t;
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V TwoN(D, const I& i, V, V, V, V) {
+    return i.tn;
   }
 };
 
@@ -94,11 +121,9 @@ struct VisibleNormals {
 //   t1 = r cos phi,  R^2 = 1 - t1^2,  t2 = R - s (R - r sin phi),  t_w^2 = R^2 - t2^2.
 // R - r sin phi and R + r sin phi have the product 1 - u1, so that neither needs to cancel; with
 // b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (p + (1 - s) b).
-struct Heitz : VisibleNormals {
-  static constexpr bool kUnit = true;
-
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+struct Heitz : VisibleNormals, UnitNormals {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
@@ -109,7 +134,7 @@ struct Heitz : VisibleNormals {
     const V scale = one / Select(vertical, one, horizontal);
     const V ex = Select(vertical, one, i.wx * scale), ey = Select(vertical, zero, i.wy * scale);
     const V inverse_nu = one / i.nu;
-    const V c = i.z * inverse_nu, s_hat = horizontal * inverse_nu;
+    const V c = i.wz * inverse_nu, s_hat = horizontal * inverse_nu;
     const V s = half * i.t * inverse_nu;
 
     const V r = Sqrt(u1);
@@ -128,25 +153,25 @@ struct Heitz : VisibleNormals {
     // m_hat_z = t2 s_hat + t_w c; where the terms' signs differ it cancels, and is s p X / (|t2| s_hat + t_w |c|) with
     // X = 2R |c| + s p behind (c <= 0), X = s b - 2R (1 - s) in front.
     V hz = Fma(t2, s_hat, tw * c);
-    const auto cancels = Or(Not(i.front), t2 < zero);
+    const auto cancels = Or(Not(i.ahead), t2 < zero);
     if (!AllFalse(d, cancels)) {
       const V two_r = big_r + big_r, sum = Fma(Abs(t2), s_hat, tw * Abs(c));
-      const V x = Select(i.front, NegFma(two_r, rest_s, s * b), Fma(two_r, Abs(c), s * p));
+      const V x = Select(i.ahead, NegFma(two_r, rest_s, s * b), Fma(two_r, Abs(c), s * p));
       hz = Select(cancels, s * p * x / sum, hz);
     }
     hz = Max(hz, Set(d, kSmallestZ));
     Unstretch(i, hx, hy, hz, drawn);
     // nu t_w, but by M itself, so that o is its reflection to the last digits.
-    drawn.im = Max(Dot(i.wx, i.wy, i.z, hx, hy, hz), Set(d, kSmallestIm));
-    drawn.two_n = i.t;
+    drawn.im = Max(Dot(i.wx, i.wy, i.wz, hx, hy, hz), Set(d, kSmallestIm));
+    drawn.two_n = i.tn;
   }
 };
 
 // A point of the spherical cap o_hat_z in (1 - t / nu, 1], and m_hat = (i_hat + o_hat) nu. Everything is kept
 // nu times as large, so that nothing has to be divided by nu. `above` is what the cap leaves out of the
 // visible one: nu + i_z - t.
-template <class D, class V = Vec<D>>
-HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2, Drawn<D>& drawn) {
+template <class D, class I, class V = Vec<D>>
+HWY_INLINE void DrawFromCap(D d, const I& i, V t, V above, V u1, V u2, Drawn<D>& drawn) {
   V sin, cos;
   SinCosTurn(d, u2, sin, cos);
   const V height = t * u1;  // nu (1 - o_hat_z)
@@ -156,22 +181,20 @@ HWY_INLINE void DrawFromCap(D d, const Incident<D>& i, V t, V above, V u1, V u2,
   if (!i.all_front) hz = Max(hz, Set(d, kSmallestZ));  // t can be very small
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but by M itself, so that o is its reflection even where m_hat is short.
-  drawn.im = Dot(i.wx, i.wy, i.z, hx, hy, hz);
+  drawn.im = Dot(i.wx, i.wy, i.wz, hx, hy, hz);
   // Where A is not what w has (ggx-inl.h, kSmallestA).
   if (!i.all_front) {
     const V half_hh = Dot(hx, hy, hz, hx, hy, hz) * Set(d, 0.5f);
-    drawn.im = Select(Or(i.front, i.a >= Set(d, kSmallestA)), drawn.im, half_hh);
+    drawn.im = Select(Or(i.ahead, i.a >= Set(d, kSmallestA)), drawn.im, half_hh);
   }
-  drawn.two_n = t;
 }
 
 // Visible normals by a spherical cap: Dupuy & Benyoub 2023.
-struct Cap : VisibleNormals {
-  static constexpr bool kUnit = false;
-
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+struct Cap : VisibleNormals, HalfVectors {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
     DrawFromCap(d, i, i.t, Zero(d), u1, u2, drawn);
+    drawn.two_n = i.tn;
   }
 };
 
@@ -180,16 +203,22 @@ struct Cap : VisibleNormals {
 // with a = alpha where it is isotropic, else min(alpha_x, alpha_y, 1) (Eq. 6). With S = 1 + sin(theta) and
 // 1 - sin(theta) = i_z^2 / S both signs have the same form: S^2 and i_z^2 change places. Likewise
 // 1 - k = a^2 (S^2 + i_z^2) / (the same denominator).
-struct Bounded {
-  static constexpr bool kUnit = false;
+struct Bounded : HalfVectors {
   static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = true;
   static constexpr bool kNIsSigma = false;
+  static constexpr bool kShifted = true;
   static constexpr bool kExact = false;
+  static constexpr bool kNormals = false;
+
+  template <class I, class V>
+  static HWY_INLINE V Normaliser(const I& i, V t) {
+    return i.all_front ? t : Select(i.front, t, i.tn);
+  }
 
   // t: nu + k i_z. above: (1 - k) i_z.
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE void Bound(D d, const Incident<D>& i, V& t, V& above) {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Bound(D d, const I& i, V& t, V& above) {
     const V one = Set(d, 1.0f);
     const V z2 = i.z * i.z;
     const V sum = one + Sqrt(Fma(i.x, i.x, i.y * i.y));
@@ -213,18 +242,19 @@ struct Bounded {
     }
   }
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D d, const Incident<D>& i, V, V) {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V TwoN(D d, const I& i, V, V, V, V) {
     V t, above;
     Bound(d, i, t, above);
-    return t;
+    return Normaliser(i, t);
   }
 
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const Incident<D>& i, V u1, V u2, V, Drawn<D>& drawn) {
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
     V t, above;
     Bound(d, i, t, above);
     DrawFromCap(d, i, t, above, u1, u2, drawn);
+    drawn.two_n = Normaliser(i, t);
   }
 };
 

@@ -1,0 +1,4 @@
+// All distributions, in the order of model.h's enumeration. Each has a file src/distributions/<name>.cc.
+#pragma once
+
+#define FACETWISE_DISTRIBUTIONS(X) X(Ggx)

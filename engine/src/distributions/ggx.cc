@@ -1,0 +1,39 @@
+// GGX's kernels.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/distributions/ggx.cc"
+#include "hwy/foreach_target.h"  // IWYU pragma: keep
+
+#include "hwy/highway.h"
+#include "src/kernels/exact-inl.h"
+#include "src/kernels/register-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+template <class D, class Pairs>
+constexpr DistributionKernels MakeGgx() {
+  DistributionKernels kernels;
+  kernels.smith = Registrar<Surface<Ggx, Smith, false>, D, Pairs>()
+                      .template Add<GgxNdf>(Sampler::ndf)
+                      .template Add<Heitz, Cap>(Sampler::heitz)
+                      .template Add<Cap>(Sampler::cap)
+                      .template Add<Cap>(Sampler::visible)
+                      .template Add<Bounded>(Sampler::bounded)
+                      .template Add<Exact>(Sampler::exact)
+                      .kernels;
+  kernels.smith_affine = Registrar<Surface<Ggx, Smith, true>, D, Pairs>()
+                             .template Add<GgxNdf>(Sampler::ndf)
+                             .template Add<Heitz, Cap>(Sampler::heitz)
+                             .template Add<Cap>(Sampler::cap)
+                             .template Add<Cap>(Sampler::visible)
+                             .template Add<Exact>(Sampler::exact)
+                             .kernels;
+  return kernels;
+}
+
+FACETWISE_REGISTER(Ggx)
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();

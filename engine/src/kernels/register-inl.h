@@ -1,0 +1,55 @@
+// From policies to tables of kernels. Include it in a distribution's own file, inside foreach_target.
+
+#if defined(FACETWISE_REGISTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_REGISTER_INL_H_
+#undef FACETWISE_REGISTER_INL_H_
+#else
+#define FACETWISE_REGISTER_INL_H_
+#endif
+
+#include "src/kernels/operations-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+// A surface's kernels for vectors D, one sampler after the other. Pairs: the tag for samplers with a long chain, which
+// gain by 15 % from pairs; the others lose up to 9 % by them where registers are few.
+template <class S, class D, class Pairs = D>
+struct Registrar {
+  SurfaceKernels kernels{};
+
+  constexpr Registrar() {
+    kernels.masking = ForEachVector<D, MaskingOf<D, S>>;
+  }
+  template <class Drawer>
+  constexpr Registrar& Add(Sampler sampler) {
+    const auto index = static_cast<std::size_t>(sampler);
+    using T = std::conditional_t<Drawer::kExact, Pairs, D>;
+    kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
+    kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
+    return *this;
+  }
+  // A second name, or a sampler that has another's density.
+  template <class Drawer, class SameDensity>
+  constexpr Registrar& Add(Sampler sampler) {
+    const auto index = static_cast<std::size_t>(sampler);
+    kernels.sample[index] = ForEachVector<D, Sample<D, S, Drawer>>;
+    kernels.query[index] = ForEachVector<D, Query<D, S, SameDensity>>;
+    return *this;
+  }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
+
+// Defines k<Name> and kOneLane<Name> from a template Make<Name><D, Pairs>() that gives DistributionKernels.
+#undef FACETWISE_REGISTER
+#define FACETWISE_REGISTER(Name)                                                     \
+  extern const DistributionKernels k##Name;                                          \
+  extern const DistributionKernels kOneLane##Name;                                   \
+  const DistributionKernels k##Name = Make##Name<hn::ScalableTag<float>, Twice<hn::ScalableTag<float>>>(); \
+  const DistributionKernels kOneLane##Name = Make##Name<hn::CappedTag<float, 1>, hn::CappedTag<float, 1>>();
+
+#endif

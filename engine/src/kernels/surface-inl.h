@@ -1,0 +1,167 @@
+// What kernels are composed of: a surface is a distribution with a masking, its slopes standard ones stretched by
+// the roughness and, if it is affine, rotated (correlated roughness) and moved (mean slope) too.
+//
+// Symbols. i, o, m as in model.h. Standard normals m_hat and slopes are those of roughness 1: m ~ M = L m_hat with
+// L = [[ax, 0, -mean_x], [0, ay, -mean_y], [0, 0, 1]], of any length. w = L^T i, its length nu, so that i.M = w.m_hat;
+// w_z is z' = i_z - mean_x i_x - mean_y i_y, i_z itself without a mean. A = w_x^2 + w_y^2. sigma(i): projected area,
+// that of the standard surface seen from w.
+//
+// Correlated roughness: i and o are rotated to the principal axes of the slopes' covariance as they are loaded,
+// and all that leaves a kernel is rotated back.
+
+#if defined(FACETWISE_SURFACE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_SURFACE_INL_H_
+#undef FACETWISE_SURFACE_INL_H_
+#else
+#define FACETWISE_SURFACE_INL_H_
+#endif
+
+#include "facetwise/model.h"
+#include "src/math/lanes-inl.h"
+#include "src/tile.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+inline constexpr float kPi = 3.14159265358979f;
+inline constexpr float kLengthTolerance = 1e-3f;  // of |v|^2 of a direction
+
+// Where w is straight below no normal is visible and sigma is 0. Behind the surface A is taken as this at least,
+// as if w were tilted by 3e-8, so that densities stay finite.
+inline constexpr float kSmallestA = 0x1p-50f;
+
+// Distribution: a policy as described in docs/adding-a-distribution.md.
+template <class Distribution_, class Masking_, bool kAffine_>
+struct Surface {
+  using Distribution = Distribution_;
+  using Masking = Masking_;
+  static constexpr bool kAffine = kAffine_;
+};
+
+// A direction seen by a surface, usually the incident one.
+template <class D, class S>
+struct Incident {
+  using V = Vec<D>;
+  using Surface = S;
+  using Distribution = typename S::Distribution;
+  HWY_INLINE Incident() {}
+  V x, y, z;
+  V ax, ay;
+  V mean_x, mean_y;  // if the surface is affine
+  V wx, wy, wz;
+  V a;      // A
+  V nu;     // length of w
+  V t;      // 2 sigma(i), times exp(shift)
+  V tn;     // the same as densities are normalised: Normalisation
+  V shift;  // of distributions whose sigma underflows: density and area are both kept times exp(shift)
+  Mask<D> front;  // i_z > 0
+  Mask<D> ahead;  // w_z > 0
+  bool all_front;  // both, in all lanes
+  const SlopeTable* table;
+};
+
+template <class S, class D, class V = Vec<D>>
+HWY_INLINE Incident<D, S> Prepare(D d, const Tile& tile, V x, V y, V z, V ax, V ay, V mean_x, V mean_y) {
+  using Distribution = typename S::Distribution;
+  Incident<D, S> i;
+  i.x = x;
+  i.y = y;
+  i.z = z;
+  i.ax = ax;
+  i.ay = ay;
+  i.wx = ax * x;
+  i.wy = ay * y;
+  i.wz = z;
+  i.front = z > Zero(d);
+  i.ahead = i.front;
+  if constexpr (S::kAffine) {
+    i.mean_x = mean_x;
+    i.mean_y = mean_y;
+    i.wz = NegFma(mean_x, x, NegFma(mean_y, y, z));
+    i.ahead = i.wz > Zero(d);
+  }
+  i.a = Fma(i.wx, i.wx, i.wy * i.wy);
+  i.nu = Sqrt(Fma(i.wz, i.wz, i.a));
+  if constexpr (S::kAffine) {
+    i.all_front = AllTrue(d, And(i.front, i.ahead));
+  } else {
+    i.all_front = AllTrue(d, i.front);
+  }
+  i.table = tile.table;
+  Distribution::Area(d, i);
+  i.tn = i.t;
+  if (!i.all_front && tile.biased) Distribution::BiasedArea(d, i);
+  return i;
+}
+
+// Standard normal to M, without and with a mean slope.
+template <class I, class V>
+HWY_INLINE void Unstretch(const I& i, V hx, V hy, V hz, V& mx, V& my) {
+  mx = i.ax * hx;
+  my = i.ay * hy;
+  if constexpr (I::Surface::kAffine) {
+    mx = NegFma(i.mean_x, hz, mx);
+    my = NegFma(i.mean_y, hz, my);
+  }
+}
+
+// alpha_x m_hat_x, alpha_y m_hat_y of an m of any length: what m has without the mean slope.
+template <class I, class V>
+HWY_INLINE void Centre(const I& i, V& mx, V& my, V mz) {
+  if constexpr (I::Surface::kAffine) {
+    mx = Fma(i.mean_x, mz, mx);
+    my = Fma(i.mean_y, mz, my);
+  }
+}
+
+// A rotation of the frame about n.
+template <class D>
+struct Rotation {
+  using V = Vec<D>;
+  HWY_INLINE Rotation() {}
+  V cos, sin;
+  HWY_INLINE void In(V& x, V& y) const {
+    const V along = Fma(cos, x, sin * y);
+    y = Fms(cos, y, sin * x);
+    x = along;
+  }
+  HWY_INLINE void Out(V& x, V& y) const {
+    const V along = Fms(cos, x, sin * y);
+    y = Fma(cos, y, sin * x);
+    x = along;
+  }
+};
+
+// To the principal axes of [[ax^2, rho ax ay], [rho ax ay, ay^2]]: ax and ay become the roots of its eigenvalues. With
+// half difference g, covariance c and R = |(g, c)|, the larger eigenvalue is mean + R and its axis is half the
+// angle of (g, c) away.
+template <class D, class V = Vec<D>>
+HWY_INLINE Rotation<D> PrincipalAxes(D d, V rho, V& ax, V& ay) {
+  const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
+  Rotation<D> r;
+  const V c = rho * (ax * ay);
+  const V g = half * ((ax - ay) * (ax + ay));
+  const V big_r = Sqrt(Fma(g, g, c * c));
+  const auto round = big_r <= zero;
+  const V safe_r = Select(round, one, big_r);
+  const V larger = Sqrt(half * ((big_r + Abs(g)) / safe_r));   // of cos, sin: in [sqrt(1/2), 1]
+  const V smaller = half * (c / (safe_r * larger));             // with c's sign
+  const auto x_is_larger = g >= zero;
+  const V sign = And(c, SignBit(d));
+  r.cos = Select(round, one, Select(x_is_larger, larger, Abs(smaller)));
+  r.sin = IfThenElseZero(Not(round), Select(x_is_larger, smaller, Xor(larger, sign)));
+  const V mean = half * Fma(ax, ax, ay * ay);
+  const V major = Sqrt(mean + big_r);
+  // The product of the roots is ax ay sqrt(1 - rho^2).
+  const V minor = ax * ay * Sqrt((one - rho) * (one + rho)) / major;
+  ax = Select(round, ax, major);
+  ay = Select(round, ay, minor);
+  return r;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
+
+#endif
