@@ -37,7 +37,7 @@ Kind kind_of(const Call& call, const Lanes& lanes, std::size_t lane) {
   if (input_fields()[kOx].operations & bits) valid &= unit(kOx, kOy, kOz);
   if (input_fields()[kU1].operations & bits) {
     valid &= in_unit_interval(in(kU1)) && in_unit_interval(in(kU2));
-    if (uses_u3(call.sampler)) valid &= in_unit_interval(in(kU3));
+    if (uses_u3({}, call.sampler)) valid &= in_unit_interval(in(kU3));
   }
   for (const Input alpha : {kAlphaX, kAlphaY}) valid &= in(alpha) > 0 && in(alpha) <= 10;
   if (unclear) return Kind::unclear;

@@ -35,7 +35,7 @@ TEST(Field, MissingInput) {
   for_each_input(true, [](const Call& call, const InputField& field) {
     MalformedCall spoilt(call);
     field.column(spoilt.batch) = {};
-    if (field.name == "u3" && !uses_u3(call.sampler)) {
+    if (field.name == "u3" && !uses_u3({}, call.sampler)) {
       spoilt.accepted();
     } else {
       spoilt.refused(field.name);

@@ -181,7 +181,7 @@ TEST(Selection, NoLanes) {
     for (const InputField& field : input_fields()) {
       Batch spoilt = batch;
       field.column(spoilt) = field.operations & bit(call.operation) ? Column<float>() : Column<float>(0.5f);
-      if (field.name == "u3" && (field.operations & bit(call.operation)) && !uses_u3(call.sampler)) continue;
+      if (field.name == "u3" && (field.operations & bit(call.operation)) && !uses_u3({}, call.sampler)) continue;
       const std::string message(run(call.operation, spoilt).status().message());
       EXPECT_EQ(message.substr(0, field.name.size()), field.name) << call_name(call);
     }

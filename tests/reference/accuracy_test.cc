@@ -247,7 +247,7 @@ void compare(Operation operation, const Model& model, Sampler sampler, std::size
       // The table's order: i, alpha, o, u.
       constexpr int kOrder[] = {kIx, kIy, kIz, kAlphaX, kAlphaY, kOx, kOy, kOz, kU1, kU2, kU3};
       if (field.operations & bit(operation)) {
-        if (kOrder[index] == kU3 && !uses_u3(sampler)) continue;
+        if (kOrder[index] == kU3 && !uses_u3({}, sampler)) continue;
         field.column(batch) = columns.column[kOrder[index]];
       }
     }

@@ -54,7 +54,7 @@ TEST_P(Consistency, SampledPdfIsThePdf) {
   Batch query = batch;
   batch.u1 = columns.column[kU1];
   batch.u2 = columns.column[kU2];
-  if (uses_u3(GetParam())) batch.u3 = columns.column[kU3];
+  if (uses_u3({}, GetParam())) batch.u3 = columns.column[kU3];
   batch.out.outgoing = {o[0], o[1], o[2]};
   batch.out.normal = {m[0], m[1], m[2]};
   batch.out.incident_dot_normal = im;

@@ -83,6 +83,7 @@ Vector sample_stretched(Sampler sampler, Roughness alpha, Vector i, double u1, d
     case Sampler::exact:
       if (i.z > 0) return sample_cone(unoccluded_cone(alpha, i), alpha, i, u1, u2, u3);
       break;
+    case Sampler::visible:
     case Sampler::cap:
       break;
   }
