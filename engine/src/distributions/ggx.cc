@@ -6,6 +6,7 @@
 #include "hwy/highway.h"
 #include "src/kernels/exact-inl.h"
 #include "src/kernels/register-inl.h"
+#include "src/kernels/vcavity-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -29,6 +30,11 @@ constexpr DistributionKernels MakeGgx() {
                              .template Add<Cap>(Sampler::visible)
                              .template Add<Exact>(Sampler::exact)
                              .kernels;
+  kernels.vcavity = Registrar<Surface<Ggx, VCavity, false>, D>()
+                        .template Add<SlopeNdf>(Sampler::ndf)
+                        .template Add<CavityVisible>(Sampler::visible)
+                        .template Add<CavityExact>(Sampler::exact)
+                        .kernels;
   return kernels;
 }
 

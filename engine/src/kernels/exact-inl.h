@@ -14,9 +14,8 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// The smallest o_z and m_hat_z that `exact` returns for i_z > 0: rounding puts a few samples in a
-// million on the wrong side of the rim they were drawn inside of, and these are raised to it.
-inline constexpr float kRim = 0x1p-30f;
+// Likewise the smallest m_hat_z (kRim, operations-inl.h).
+inline constexpr float kRimZ = 0x1p-30f;
 
 // The elliptic cone of unoccluded normals, for i_z > 0.
 template <class D>
@@ -259,11 +258,11 @@ struct Exact {
   }
 
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V u3, Drawn<D>& drawn) {
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V& u3, Drawn<D>& drawn) {
     const Roughness<D> roughness(d, i);
     Cone<D> cone;
     MakeConeOf(d, i, roughness, cone);
-    const V rim = Set(d, kRim);
+    const V rim = Set(d, kRimZ);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
 

@@ -242,6 +242,10 @@ struct SampleInputs : Inputs<D, S> {
   }
 };
 
+// The smallest o_z that samplers without occluded reflections return for i_z > 0: rounding puts a few samples in
+// a million on the wrong side of the rim they were drawn inside of, and these are raised to it.
+inline constexpr float kRim = 0x1p-30f;
+
 // sample_reflection and sample_normal.
 template <class D, class S, class Sampler>
 struct Sample {
@@ -260,14 +264,15 @@ struct Sample {
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
 
     Drawn<D> drawn;
-    Sampler::Draw(d, i, exceptions.Harmless(in.u1, 0.0f), exceptions.Harmless(in.u2, 0.0f),
-                  exceptions.Harmless(in.u3, 0.0f), drawn);
+    V u3 = exceptions.Harmless(in.u3, 0.0f);
+    Sampler::Draw(d, i, exceptions.Harmless(in.u1, 0.0f), exceptions.Harmless(in.u2, 0.0f), u3, drawn);
 
     // o = 2 (i.M) / (M.M) M - i
     V rho = (drawn.im + drawn.im) / drawn.mm;
-    if constexpr (Sampler::kExact) {
+    if constexpr (Sampler::kUnit) {
+    } else if constexpr (Sampler::kExact) {
       if (!i.all_front) rho = Select(i.front, rho, Max(rho, Set(d, kSmallestRho<S>)));
-    } else if constexpr (!Sampler::kUnit) {
+    } else {
       rho = Max(rho, Set(d, kSmallestRho<S>));
     }
     V ox = Fms(rho, drawn.mx, i.x), oy = Fms(rho, drawn.my, i.y);
@@ -276,6 +281,7 @@ struct Sample {
 
     auto occluded = tile.normals_alone ? NoLanes(d) : oz <= zero;
     if constexpr (!Sampler::kVisible) occluded = Or(occluded, drawn.im <= Set(d, kSmallestIm));
+    if (!i.all_front) occluded = Or(occluded, S::Masking::Blind(d, i));
     const auto accepted = Not(occluded);
 
     // p(o) = D(m) / (4 N)
@@ -284,7 +290,7 @@ struct Sample {
       V numerator, denominator;
       Sampler::Density(d, i, drawn, rho, numerator, denominator);
       denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
-      pdf = IfThenElseZero(accepted, numerator / denominator);
+      pdf = IfThenElseZero(accepted, Min(numerator / denominator, Set(d, 3e38f)));
     }
 
     const bool fresnel = tile.interface != Interface::conductor && (tile.wanted & kWantsWeight);
@@ -378,7 +384,8 @@ struct Query {
     const V h2 = Dot(hx, hy, hz, hx, hy, hz);
     // o = -i to float's last bits has no half vector.
     const auto above = z > zero;
-    const auto reached = And(And(above, hz > zero), h2 > Set(d, 0x1p-40f));
+    auto reached = And(And(above, hz > zero), h2 > Set(d, 0x1p-40f));
+    if (!i.all_front) reached = AndNot(S::Masking::Blind(d, i), reached);
     // Lanes that no microfacet reaches compute with the half vector (0, 0, 1).
     const V mx = IfThenElseZero(reached, hx), my = IfThenElseZero(reached, hy), mz = Select(reached, hz, one);
     const V m2 = Select(reached, h2, one);
@@ -404,7 +411,7 @@ struct Query {
       if (tile.interface != Interface::conductor) value = value * Reflectance(d, tile, lane, Sqrt(m2) * Set(d, 0.5f));
       StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
     }
-    exceptions.Finish(tile, lane, Not(above), statistics);
+    exceptions.Finish(tile, lane, Or(Not(above), S::Masking::Blind(d, i)), statistics);
   }
 };
 

@@ -90,7 +90,7 @@ struct GgxNdf : UnitNormals {
   }
 
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
     const V r = Sqrt(u1);
@@ -123,7 +123,7 @@ struct VisibleNormals {
 // b = R - r sin phi, p = R + r sin phi: t_w^2 = s b (p + (1 - s) b).
 struct Heitz : VisibleNormals, UnitNormals {
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
     V sin, cos;
     SinCosTurn(d, u2, sin, cos);
@@ -192,7 +192,7 @@ HWY_INLINE void DrawFromCap(D d, const I& i, V t, V above, V u1, V u2, Drawn<D>&
 // Visible normals by a spherical cap: Dupuy & Benyoub 2023.
 struct Cap : VisibleNormals, HalfVectors {
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     DrawFromCap(d, i, i.t, Zero(d), u1, u2, drawn);
     drawn.two_n = i.tn;
   }
@@ -250,7 +250,7 @@ struct Bounded : HalfVectors {
   }
 
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V, Drawn<D>& drawn) {
+  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     V t, above;
     Bound(d, i, t, above);
     DrawFromCap(d, i, t, above, u1, u2, drawn);

@@ -16,12 +16,25 @@ namespace HWY_NAMESPACE {
 struct Smith {
   static constexpr bool kUnboundedW = false;  // of Value()
 
+  template <class D, class I>
+  static HWY_INLINE void Area(D d, I& i) {
+    I::Distribution::Area(d, i);
+  }
+  template <class D, class I>
+  static HWY_INLINE void BiasedArea(D d, I& i) {
+    I::Distribution::BiasedArea(d, i);
+  }
+  template <class D, class I>
+  static HWY_INLINE Mask<D> Blind(D d, const I&) {
+    return NoLanes(d);
+  }
+
   // w = f cos(theta_o) / pdf_visible(o), as numerator and denominator, for o_z > 0. With z' of o,
   // Lambda(o) = sigma(-o) / z'(o), so that
   //   correlated    sigma(i) / (sigma(i) + |z'(i)| Lambda(o)) = 2 sigma(i) z'(o) / (2 sigma(i) z'(o) + |z'(i)| 2 sigma(-o))
   //   uncorrelated  G1(o) = 2 z'(o) / (2 sigma(o))
-  // Nothing cancels, in front or behind. z'(o) is taken as 2^-60 at least, where no product underflows; `seen` is false
-  // where it is not positive: then w is 0. `separate` takes G1(o) whatever the setting.
+  // Nothing cancels, in front or behind. z'(o) is taken as 2^-60 at least, where no product underflows; where it is not
+  // positive w is 0.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Shadowing(D d, const I& i, V ox, V oy, V oz, bool uncorrelated, V& numerator,
                                    V& denominator) {
@@ -67,7 +80,7 @@ struct Smith {
 
   // What a direction o below the surface sees of the microfacets that transmit to it: G1 of -o.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V TransmissionMasking(D d, const I& i, V, V, V ox, V oy, V oz) {
+  static HWY_INLINE V TransmissionMasking(D d, const I& i, V, V, V, V ox, V oy, V oz) {
     V numerator, denominator;
     Shadowing(d, i, Neg(ox), Neg(oy), Neg(oz), true, numerator, denominator);
     return Min(numerator / denominator, Set(d, 1.0f));
@@ -84,7 +97,8 @@ struct Smith {
   // Share of the visible normals whose reflection is not occluded.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V Share(D d, const I& i) {
-    return I::Distribution::Share(d, i);
+    if constexpr (I::Distribution::kHasShare) return I::Distribution::Share(d, i);
+    return Zero(d);
   }
 };
 

@@ -63,7 +63,6 @@ struct Incident {
 
 template <class S, class D, class V = Vec<D>>
 HWY_INLINE Incident<D, S> Prepare(D d, const Tile& tile, V x, V y, V z, V ax, V ay, V mean_x, V mean_y) {
-  using Distribution = typename S::Distribution;
   Incident<D, S> i;
   i.x = x;
   i.y = y;
@@ -89,9 +88,9 @@ HWY_INLINE Incident<D, S> Prepare(D d, const Tile& tile, V x, V y, V z, V ax, V 
     i.all_front = AllTrue(d, i.front);
   }
   i.table = tile.table;
-  Distribution::Area(d, i);
+  S::Masking::Area(d, i);
   i.tn = i.t;
-  if (!i.all_front && tile.biased) Distribution::BiasedArea(d, i);
+  if (!i.all_front && tile.biased) S::Masking::BiasedArea(d, i);
   return i;
 }
 

@@ -1,0 +1,158 @@
+// Student-t of gamma = 3: pi P22 = 8 / (2 + r^2)^3. With slopes measured by sqrt(2) alpha it is 2 / (1 + r^2)^3, the normals of a
+// sphere weighted by 2 m_hat_z^2, and all is algebraic: for w so stretched, of length nu,
+// 2 sigma = (nu + w_z)^2 / (2 nu).
+
+#if defined(FACETWISE_STUDENT_T_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_STUDENT_T_INL_H_
+#undef FACETWISE_STUDENT_T_INL_H_
+#else
+#define FACETWISE_STUDENT_T_INL_H_
+#endif
+
+#include "src/kernels/slopes-inl.h"
+#include "src/math/roots-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+struct StudentT : SlopeDistribution<StudentT> {
+  static constexpr bool kShifts = false;
+  static constexpr bool kHasShare = false;
+  static constexpr bool kCavityBehind = false;
+  static constexpr float kLargestRoughness = kLargestAlpha;
+
+  // nu + z, and nu itself, for w stretched by sqrt(2) more; behind by its conjugate.
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V Sum(D d, V z, V a, V& nu) {
+    const V a2 = Max(a + a, Set(d, kSmallestA));
+    nu = Sqrt(Fma(z, z, a2));
+    const V larger = nu + Abs(z);
+    return Select(z > Zero(d), larger, a2 / larger);
+  }
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Area(D d, I& i) {
+    V nu;
+    const V sum = Sum(d, i.wz, i.a, nu);
+    i.t = sum * sum / (nu + nu);
+  }
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void BiasedArea(D d, I& i) {
+    V nu;
+    const V sum = Sum(d, Abs(i.wz), i.a, nu);
+    i.tn = sum * sum / (nu + nu);
+  }
+  // nu - z is 2 A / (nu + z).
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void Areas(D d, const I&, V z, V a, V& front, V& back, V& scale) {
+    V nu;
+    const V sum = Sum(d, z, a, nu), a2 = a + a;
+    back = a2 * a2;
+    scale = (nu + nu) * (sum * sum);
+    front = sum * sum / (nu + nu);
+  }
+
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V Profile(D d, const I&, V x, V y, V) {
+    const V two = Set(d, 2.0f);
+    const V c = two / (two + Fma(x, x, y * y));
+    return c * c * c;
+  }
+
+  // Share of slopes within r: 1 - (1 + r^2 / 2)^-2.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void DrawSlope(D d, const I&, V u1, V u2, V& x, V& y) {
+    PolarSlope(d, Sqrt(SquaredRadius(d, u1, Set(d, 1.0f) - u1)), u2, x, y);
+  }
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V SquaredRadius(D, V u, V rest) {
+    const V v = Sqrt(rest);
+    return (u + u) / Fma(v, v, v);
+  }
+  // That share for r^2, and what is beyond.
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V Within(D d, V r2, V& beyond) {
+    const V half = r2 * Set(d, 0.5f), v = Set(d, 1.0f) / (Set(d, 1.0f) + half);
+    beyond = v * v;
+    return half * Fma(v, v, v);  // 1 - v^2 = (1 - v)(1 + v), 1 - v = half v
+  }
+
+  // In the frame stretched by sqrt(2) alpha, x = (t - 1/t) / 2; x's largest value has t = T = (1 + c) / s. The share below
+  // t = T z is
+  //   F(z) = z^3 ((T^2 - 1) z (3 + T^2 z^2) + 4) (1 + T^2) / (1 + T^2 z^2)^3,
+  // solved by three Halley steps: error of F 6e-7. They start from the solutions for T = 1 and T = infinity in
+  // q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's share is that of a fixed density.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE void DrawVisible(D d, const I& i, V, V, V u1, V u2, V& x, V& y, V& gap) {
+    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f);
+    V nu;
+    const V sum = Sum(d, i.wz, i.a, nu);
+    const V s_nu = Sqrt(Max(i.a + i.a, Set(d, kSmallestA)));
+    // Within 2^-13 of straight down it makes no difference.
+    const V t_max = Min(sum / s_nu, Set(d, 0x1p13f));
+    const V t2 = t_max * t_max;
+    const V one_t2 = one + t2;
+
+    const V u = Max(u1, Set(d, 0x1p-26f)), rest = one - u;
+    const V inverse_root = InverseCubeRoot(d, u);
+    const V s1 = u * inverse_root * inverse_root;  // cube root
+    const V q1 = Sqrt(Max(NegFma(s1, s1, one), zero));
+    const V low = Min(u, rest) * Set(d, 4.0f);
+    const V end = Sqrt(low / (three - Sqrt(low * Set(d, 1.0f / 3.0f))));
+    const auto lower = u < half;
+    // 1 + q for T = 1 and T = infinity
+    const V from = s1 * s1 / (one + q1), to = Select(lower, end, Set(d, 2.0f) - end);
+    const V c = Max((t2 - one) / one_t2, zero);
+    const V onep = Fma(c, to - from, from);
+    V z = onep / (Sqrt(onep * (Set(d, 2.0f) - onep)) * Max(t_max, one));
+    z = Min(z, Set(d, 1.0f - 0x1p-12f));
+    for (int step = 0; step < 3; ++step) {
+      const V zz = z * z, b = Fma(t2, zz, one);
+      const V inverse_b = one / b;
+      const V inverse_b3 = inverse_b * inverse_b * inverse_b;
+      const V scale = one_t2 * inverse_b3;
+      const V linear = Fma(t2, z, one);
+      const V f = zz * z * Fma((t2 - one) * z, Fma(t2, zz, three), Set(d, 4.0f)) * scale - u;
+      const V gone = one - z;
+      // F' = 12 z^2 (1 - z)(T^2 z + 1)(1 + T^2) / b^4; half of (log F')' times F'.
+      const V f1 = Set(d, 12.0f) * zz * gone * linear * scale * inverse_b;
+      const V ratio = f / f1;
+      const V bend = one / z - half / gone + half * t2 / linear - Set(d, 4.0f) * t2 * z * inverse_b;
+      const V next = z - ratio / Max(NegFma(ratio, bend, one), Set(d, 0.25f));
+      z = Min(Max(next, z * Set(d, 0.25f)), Set(d, 1.0f - 0x1p-24f));
+    }
+    const V t = t_max * z;
+    const V scaled = half * (t - one / t);
+    const V gone = one - z;
+    // gap = (1 - z)(T^2 z + 1) / (z (1 + T^2)) of the stretched frame, whose nu is larger than w's.
+    gap = gone * Fma(t2, z, one) / (z * one_t2) * (nu / i.nu);
+    const V root2 = Set(d, 1.41421356f);
+    x = root2 * scaled;
+    // y = sqrt(1 + x^2) times a number with density ~ (1 + y^2)^-3.
+    y = root2 * (half * (t + one / t)) * Conditional(d, u2);
+  }
+
+ private:
+  // The y with density 8 / (3 pi (1 + y^2)^3) and share u below. Both tails fall with y^-5: y is (1 - u)^(-1/5) - u^(-1/5)
+  // times a smooth function of (4 u (1 - u))^(1/5), fitted by a polynomial. Error of the share 2e-7.
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V Conditional(D d, V u) {
+    const V low = Max(u, Set(d, 0x1p-26f)), high = Set(d, 1.0f) - u;
+    const V k = Set(d, 1.0f) / InverseFifthRoot(d, Set(d, 4.0f) * (low * high));
+    V p = Set(d, -0.0154215065f);
+    p = Fma(p, k, Set(d, 0.057050321f));
+    p = Fma(p, k, Set(d, -0.0578400181f));
+    p = Fma(p, k, Set(d, -0.0240463937f));
+    p = Fma(p, k, Set(d, 0.0371487362f));
+    p = Fma(p, k, Set(d, 0.0521361166f));
+    p = Fma(p, k, Set(d, 0.531557542f));
+    p = Fma(p, k, Set(d, 0.701406545f));
+    return p * (InverseFifthRoot(d, high) - InverseFifthRoot(d, low));
+  }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
+
+#endif
