@@ -13,15 +13,17 @@ namespace {
 template <class F>
 Real over_unoccluded(const Surface& surface, Vector i, Real tolerance, const F& f) {
   const Stretched w = stretched(surface, i);
-  // Rays start where all of them are in the region: it is convex, and the half vector of i and n is inside. At 0 for
-  // centred slopes, and behind, where the region is a half plane that may not have 0.
+  // Rays start inside the region, which is convex: at 0, around which the density is, or where that is
+  // occluded at the half vector of i and n. Behind, the region is a half plane, and rays start at 0 wherever
+  // it is.
   Slope start{0, 0};
-  if (i.z > 0 && !is_centred(surface)) start = standard_slope(surface, normalize(i + Vector{0, 0, 1}));
+  const LongNormal centre = normal_of(surface, start);
+  if (i.z > 0 && 2 * w.z <= static_cast<Real>(i.z) * (1 + centre.x * centre.x + centre.y * centre.y))
+    start = standard_slope(surface, normalize(i + Vector{0, 0, 1}));
   const LongNormal m0 = normal_of(surface, start);
   const Real im0 = w.z - w.x * start.x - w.y * start.y;
   const Real iz = i.z, c0 = 2 * im0 - iz * (1 + m0.x * m0.x + m0.y * m0.y);
   const Real horizontal = std::hypot(w.x, w.y), determinant = slope_determinant(surface);
-  const LongNormal centre = normal_of(surface, {0, 0});
 
   const auto along = [&](Real cos, Real sin) {
     const LongNormal unit = normal_of(surface, {cos, sin});
@@ -46,8 +48,18 @@ Real over_unoccluded(const Surface& surface, Vector i, Real tolerance, const F& 
                      static_cast<double>(2 * im * z - iz)};
       return f(m, im, o) * z * z * z * determinant;
     };
-    return integrate_ray(at, low, high, falls_over(surface, low), tolerance);
+    // The density's peak along the ray.
+    const Real nearest = std::clamp(-start.x * cos - start.y * sin, low, high);
+    const Real before = integrate(
+        [&](Real t) {
+          const Real r = nearest - t;
+          return at(r) * r;
+        },
+        0, nearest - low, tolerance);
+    return before + integrate_ray(at, nearest, high, falls_over(surface, low), tolerance);
   };
+  if (start.x != 0 || start.y != 0)
+    return integrate_azimuths(along, std::atan2(-start.y, -start.x), 1, tolerance * 4);
   const Real peak = w.z < 0 ? 1 / (1 - w.z / std::max<Real>(horizontal, 1e-30L)) : 1;
   return integrate_azimuths(along, std::atan2(w.y, w.x), peak, tolerance * 4);
 }

@@ -22,9 +22,9 @@ Real half_sum(Real a2, Real z) {
   return z >= 0 ? (z + nu) / 2 : a2 / (2 * (nu - z));
 }
 
-// Along rays of standard slopes: the kink of max(i.M, 0) is one of their ends.
-Real area_by_quadrature(const Surface& surface, Stretched w) {
-  const Real a = std::hypot(w.x, w.y), tolerance = 1e-11L * (a + std::abs(w.z));
+// Along rays of standard slopes, to an absolute tolerance: the kink of max(i.M, 0) is one of their ends.
+Real area_by_quadrature(const Surface& surface, Stretched w, Real tolerance) {
+  const Real a = std::hypot(w.x, w.y);
   if (a == 0) return std::max<Real>(w.z, 0);
   const auto along = [&](Real cos, Real sin) {
     const Real slope = w.x * cos + w.y * sin;
@@ -36,8 +36,19 @@ Real area_by_quadrature(const Surface& surface, Stretched w) {
     };
     return integrate_ray(f, low, high, falls_over(surface, low), tolerance);
   };
-  return integrate_azimuths(along, std::atan2(w.y, w.x), std::min<Real>(1, std::max<Real>(std::abs(w.z) / a, 0.1L)),
-                            tolerance);
+  return integrate_azimuths(along, std::atan2(w.y, w.x),
+                            std::min<Real>(1, std::max<Real>(std::abs(w.z) / a, 0.1L)), tolerance);
+}
+
+// To about 1e-10 of the area, which is small behind.
+Real area_by_quadrature(const Surface& surface, Stretched w) {
+  Real tolerance = 1e-11L * (std::hypot(w.x, w.y) + std::abs(w.z));
+  Real sum = area_by_quadrature(surface, w, tolerance);
+  for (int pass = 0; pass < 8 && sum > 0 && tolerance > 1e-10L * sum; ++pass) {
+    tolerance = 1e-11L * sum;
+    sum = area_by_quadrature(surface, w, tolerance);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -62,7 +73,8 @@ Slope standard_slope(const Surface& surface, Vector m) {
 
 LongNormal normal_of(const Surface& surface, Slope s) {
   return {-(surface.mean_slope_x + surface.alpha.x * s.x),
-          -(surface.mean_slope_y + surface.alpha.y * (surface.slope_correlation * s.x + independent(surface) * s.y))};
+          -(surface.mean_slope_y +
+            surface.alpha.y * (surface.slope_correlation * s.x + independent(surface) * s.y))};
 }
 
 Scaled standard_density(const Surface& surface, Slope s) {
@@ -112,7 +124,9 @@ Scaled area(const Surface& surface, Stretched w) {
       return {area_by_quadrature(surface, w), 0};
     case Distribution::table:
       if (surface.table_area)
-        return {surface.table_area({static_cast<double>(w.x), static_cast<double>(w.y), static_cast<double>(w.z)}), 0};
+        return {surface.table_area(
+                    {static_cast<double>(w.x), static_cast<double>(w.y), static_cast<double>(w.z)}),
+                0};
       return {area_by_quadrature(surface, w), 0};
   }
   return {};
@@ -123,7 +137,9 @@ double slope_density(const Surface& surface, double x, double y) {
                              slope_determinant(surface));
 }
 
-double distribution(const Surface& surface, Vector m) { return static_cast<double>(value(normal_density(surface, m))); }
+double distribution(const Surface& surface, Vector m) {
+  return static_cast<double>(value(normal_density(surface, m)));
+}
 
 double projected_area(const Surface& surface, Vector i) {
   return static_cast<double>(value(area(surface, stretched(surface, i))));

@@ -14,8 +14,8 @@ struct Ratios {
   Real zeroth, first;
 };
 
-// Repeated integrals I_n of erfc, I_-1 = 2 exp(-t^2) / sqrt(pi), obey I_(n-1) = 2 t I_n + 2 (n + 1) I_(n+1), so
-// that r_n = I_n / I_(n-1) = 1 / (2 t + 2 (n + 1) r_(n+1)): a continued fraction of positive terms.
+// Repeated integrals I_n of erfc, I_-1 = 2 exp(-t^2) / sqrt(pi), obey I_(n-1) = 2 t I_n + 2 (n + 1) I_(n+1),
+// so that r_n = I_n / I_(n-1) = 1 / (2 t + 2 (n + 1) r_(n+1)): a continued fraction of positive terms.
 Ratios ratios(Real t) {
   Real r = 0, next = 0;
   for (int n = 600; n >= 0; --n) {
@@ -46,7 +46,7 @@ Scaled gaussian_interval(Real a, Real b) {
     b = -b;
   }
   const auto beyond = [&](Real y) { return (y - a) * (y + a); };  // y^2 - a^2
-  if ((b - a) * std::max<Real>(1, a) < 1)  // the difference would cancel
+  if ((b - a) * std::max<Real>(1, a) < 1)                         // the difference would cancel
     return {integrate([&](Real y) { return std::exp(-beyond(y)); }, a, b, Real{0}) * kInverseRootPi, -a * a};
   return {(erfcx(a) - std::exp(-beyond(b)) * erfcx(b)) / 2, -a * a};
 }

@@ -57,10 +57,13 @@ Scaled smith_normaliser(const Surface& surface, Vector i) {
   return area(surface, w);
 }
 
-double hit_probability(const Surface& surface, Vector i) { return static_cast<double>(value(hits(surface, i))); }
+double hit_probability(const Surface& surface, Vector i) {
+  return static_cast<double>(value(hits(surface, i)));
+}
 
 double normaliser(const Surface& surface, Vector i) {
-  if (surface.model.masking == Masking::smith) return static_cast<double>(value(smith_normaliser(surface, i)));
+  if (surface.model.masking == Masking::smith)
+    return static_cast<double>(value(smith_normaliser(surface, i)));
   return static_cast<double>(value(vcavity_hits(surface, i)) * std::abs(i.z));
 }
 

@@ -13,7 +13,8 @@ namespace facetwise::reference {
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
-// Integral of f(r) r dr over [low, high], high possibly infinite, where f falls from `low` over about `scale`.
+// Integral of f(r) r dr over [low, high], high possibly infinite, where f falls from `low` over about
+// `scale`.
 template <class F>
 Real integrate_ray(const F& f, Real low, Real high, Real scale, Real tolerance) {
   const auto mapped = [&](Real v) {
@@ -24,8 +25,8 @@ Real integrate_ray(const F& f, Real low, Real high, Real scale, Real tolerance) 
   return integrate(mapped, 0, end, tolerance);
 }
 
-// Integral over azimuths of f(cos, sin), which may have peaks of the width `scale` about `phi` and kinks a quarter
-// of a turn from it.
+// Integral over azimuths of f(cos, sin), which may have peaks of the width `scale` about `phi` and kinks a
+// quarter of a turn from it.
 template <class F>
 Real integrate_azimuths(const F& f, Real phi, Real scale, Real tolerance) {
   Real sum = 0;

@@ -33,8 +33,8 @@ Real smith_shadowing(const Surface& surface, Vector i, Vector o) {
   if (z <= 0) return 0;
   const Real g1 = z / value(area(surface, stretched(surface, o)));
   if (surface.model.shadowing == Shadowing::uncorrelated) return g1;
-  // sigma / (sigma + |z'| Lambda) with Lambda = (sigma(o) - z'(o)) / z'(o). The facets that face away make up the
-  // difference: sigma(o) - z'(o) = sigma(-o), which does not cancel.
+  // sigma / (sigma + |z'| Lambda) with Lambda = (sigma(o) - z'(o)) / z'(o). The facets that face away make up
+  // the difference: sigma(o) - z'(o) = sigma(-o), which does not cancel.
   const Real lambda = value(area(surface, stretched(surface, -1 * o))) / z;
   const Real sigma = value(smith_normaliser(surface, i));
   const Real masked = std::abs(stretched(surface, i).z) * lambda;

@@ -1,5 +1,5 @@
-// Numbers as mantissa * exp(exponent): densities and areas of a Gaussian underflow far behind the surface, where
-// their quotients do not.
+// Numbers as mantissa * exp(exponent): densities and areas of a Gaussian underflow far behind the surface,
+// where their quotients do not.
 #pragma once
 
 #include <cmath>

@@ -6,7 +6,8 @@
 
 namespace facetwise::reference {
 
-// A direction in the frame of standard slopes: i.M = z - x s_x - y s_y for the normal M = (-slope, 1). Any length.
+// A direction in the frame of standard slopes: i.M = z - x s_x - y s_y for the normal M = (-slope, 1). Any
+// length.
 struct Stretched {
   Real x, y, z;
 };
@@ -24,7 +25,8 @@ LongNormal normal_of(const Surface& surface, Slope s);
 // Determinant of the map from standard slopes to slopes: ax ay sqrt(1 - rho^2).
 Real slope_determinant(const Surface& surface);
 
-// Density of standard slopes; of normals; projected area; hit probability; what Smith densities are divided by.
+// Density of standard slopes; of normals; projected area; hit probability; what Smith densities are divided
+// by.
 Scaled standard_density(const Surface& surface, Slope s);
 Scaled normal_density(const Surface& surface, Vector m);
 Scaled area(const Surface& surface, Stretched w);

@@ -32,8 +32,8 @@ Refraction refraction(const Surface& surface, Vector i, Vector o) {
   return r;
 }
 
-// How much of o, below the surface, is not shadowed. Smith: masking of -o, since the facets' area seen from o is
-// that of the facets which face -o.
+// How much of o, below the surface, is not shadowed. Smith: masking of -o, since the facets' area seen from o
+// is that of the facets which face -o.
 Real shadowing(const Surface& surface, Vector i, Vector o, const Refraction& r) {
   if (surface.model.masking == Masking::smith) return masking(surface, -1 * o);
   const Real masked = std::min<Real>(1, 2 * r.m.z * std::abs(static_cast<Real>(i.z)) / r.im);
@@ -45,7 +45,8 @@ Sampler of_normals(Sampler sampler) { return sampler == Sampler::ndf ? sampler :
 
 double share(const Surface& surface, Real im, bool reflects, bool transmits, bool reflection) {
   const double f = fresnel(surface, static_cast<double>(im));
-  const double reflected = reflects ? f : 0, transmitted = transmits ? 1 - f : 0, sum = reflected + transmitted;
+  const double reflected = reflects ? f : 0, transmitted = transmits ? 1 - f : 0,
+               sum = reflected + transmitted;
   if (sum == 0) return 0;
   return (reflection ? reflected : transmitted) / sum;
 }
@@ -90,7 +91,8 @@ double pdf_scattering(const Surface& surface, Sampler sampler, Vector i, Vector 
   if (o.z < 0) {
     const Refraction r = refraction(surface, i, o);
     if (!r.exists() || surface.model.interface != Interface::dielectric) return 0;
-    return pdf_transmission(surface, sampler, i, o) * share(surface, r.im, reflects(i, r.m, r.im), true, false);
+    return pdf_transmission(surface, sampler, i, o) *
+           share(surface, r.im, reflects(i, r.m, r.im), true, false);
   }
   const Vector from = turned(surface, i), h = from + o;
   if (o.z <= 0 || h.z <= 0) return 0;

@@ -17,7 +17,15 @@ struct Principal {
 };
 
 Principal principal(const Surface& surface, Vector i, Vector m) {
-  Principal p{surface.alpha.x, surface.alpha.y, surface.mean_slope_x, surface.mean_slope_y, i.x, i.y, i.z, m.x, m.y,
+  Principal p{surface.alpha.x,
+              surface.alpha.y,
+              surface.mean_slope_x,
+              surface.mean_slope_y,
+              i.x,
+              i.y,
+              i.z,
+              m.x,
+              m.y,
               m.z};
   if (surface.slope_correlation == 0) return p;
   const Real ax = p.ax, ay = p.ay, covariance = surface.slope_correlation * ax * ay;
@@ -36,7 +44,8 @@ Principal principal(const Surface& surface, Vector i, Vector m) {
   return p;
 }
 
-// Azimuth by azimuth of standard slopes, a radius below the far limit, flipped where both signs are unoccluded.
+// Azimuth by azimuth of standard slopes, a radius below the far limit, flipped where both signs are
+// unoccluded.
 Real vcavity_density(const Surface& surface, Vector i, Vector m, Real im) {
   const Slope s = standard_slope(surface, m);
   const Real r = std::hypot(s.x, s.y);
@@ -97,8 +106,8 @@ Real unoccluded_area(const Surface& surface, Vector i) {
   const Real qx = p.ax * (p.ix + p.iz * p.mean_x), qy = p.ay * (p.iy + p.iz * p.mean_y);
   const Real h = 2 * wz - p.iz * (1 + p.mean_x * p.mean_x + p.mean_y * p.mean_y);
   const Real cx = p.iz * p.ax * p.ax, cy = p.iz * p.ay * p.ay, q2 = qx * qx + qy * qy;
-  // The positive root of l - h = q_x^2 / (l + c_x) + q_y^2 / (l + c_y). The right side grows when c_x, c_y are
-  // left out, which bounds the root from above.
+  // The positive root of l - h = q_x^2 / (l + c_x) + q_y^2 / (l + c_y). The right side grows when c_x, c_y
+  // are left out, which bounds the root from above.
   const Real bound = std::sqrt(h * h + 4 * q2);
   Real low = std::max<Real>(h, 0), high = h > 0 ? (h + bound) / 2 : 2 * q2 / (bound - h), lambda = high;
   for (int step = 0; step < 300; ++step) {
