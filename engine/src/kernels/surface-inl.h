@@ -17,7 +17,7 @@
 #endif
 
 #include "facetwise/model.h"
-#include "src/math/lanes-inl.h"
+#include "src/math/exp-inl.h"
 #include "src/tile.h"
 
 HWY_BEFORE_NAMESPACE();

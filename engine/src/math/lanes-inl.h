@@ -104,6 +104,7 @@ HWY_INLINE Pair<V> ShiftLeft(Pair<V> x) {
   return {hn::ShiftLeft<kBits>(x.a), hn::ShiftLeft<kBits>(x.b)};
 }
 using hn::ShiftLeft;
+using hn::ShiftRight;
 
 // Operations with a tag.
 template <class D, class T>
