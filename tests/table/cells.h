@@ -1,5 +1,5 @@
-// Cells of the visible slopes of an incident direction: equal steps in the share f of the visible tilts' tan(chi / 2)
-// and in the side h.
+// Cells of the visible slopes of an incident direction: equal steps in the share f of the visible tilts'
+// tan(chi / 2) and in the side h.
 #pragma once
 
 #include <cstddef>

@@ -9,7 +9,8 @@ namespace facetwise::test {
 
 double ggx(double x, double y);
 double beckmann(double x, double y);
-// Skewed, in no direction symmetric, with a tail as heavy as that of measured surfaces; no closed form of anything.
+// Skewed, in no direction symmetric, with a tail as heavy as that of measured surfaces; no closed form of
+// anything.
 double skewed(double x, double y);
 
 // Fails the test, and returns nothing, where the table cannot be built.

@@ -30,7 +30,9 @@ class TemporaryFile {
   std::string path_;
 };
 
-std::string refusal(std::string_view bytes) { return std::string(SlopeTable::parse(bytes).status().message()); }
+std::string refusal(std::string_view bytes) {
+  return std::string(SlopeTable::parse(bytes).status().message());
+}
 
 TEST(SlopeTableFile, SameBits) {
   const TemporaryFile file("table");

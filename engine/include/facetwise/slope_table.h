@@ -28,8 +28,8 @@ using SlopeDensity = std::function<double(double x, double y)>;
 struct SlopeTableView {
   static constexpr std::int32_t kAreaTurns = 4;
 
-  const float* density;  // D(m): [grid][grid] (y, x) over the square around w = slope / (1 + sqrt(1 + slope^2)),
-                         // or if radial [grid] over |w| in [0, 1]
+  const float* density;  // D(m): [grid][grid] (y, x) over the square around w = slope / (1 + sqrt(1 +
+                         // slope^2)), or if radial [grid] over |w| in [0, 1]
   const float* area;     // projected area over (1 + cos theta) / 2: [row of kAreaTurns azimuths + 1][areas]
   const float* tilt;     // where m tilts to in the plane of incidence: [row][incidence][uniforms + 1]
   const float* side;     // where m leans to, given its tilt: [row][slopes][uniforms + 1]
@@ -42,7 +42,7 @@ class SlopeTable {
  public:
   // Sizes; 0 is the default, of which the first is for radial tables.
   struct Options {
-    bool radial = false;        // P22 depends on x^2 + y^2 alone: it is called with y = 0
+    bool radial = false;        // P22 depends on x^2 + y^2 alone
     std::size_t grid = 0;       // nodes of the density, per axis: 1025, 513
     std::size_t incidence = 0;  // nodes in theta: 129, 65
     std::size_t slopes = 0;     // nodes in tilt: 129, 129
@@ -53,9 +53,10 @@ class SlopeTable {
     std::function<void(double)> progress{};
   };
 
-  // Calls p22 on this thread alone, at the grid's nodes. The same machine makes the same bits with any threads;
-  // another's sine may differ in the last place: to have one table, share its file.
-  static absl::StatusOr<std::shared_ptr<const SlopeTable>> build(const SlopeDensity& p22, const Options& options);
+  // Calls p22 on this thread alone, at the grid's nodes; it may throw. The same machine makes the same bits
+  // with any threads; another's sine may differ in the last place: to have one table, share its file.
+  static absl::StatusOr<std::shared_ptr<const SlopeTable>> build(const SlopeDensity& p22,
+                                                                 const Options& options);
 
   // Densities at nx times ny equidistant slopes, x fastest; linear in between, 0 outside.
   struct Range {

@@ -1,8 +1,8 @@
-// Tabulated distributions (facetwise/slope_table.h) in lanes: docs/tables.md. src/table/layout.h says what a tilt and
-// a side are.
+// Tabulated distributions (facetwise/slope_table.h) in lanes: docs/tables.md. src/table/layout.h says what a
+// tilt and a side are.
 //
-// Every function takes the stretched unit incident direction as cos(theta), sin(theta) >= 0, cos(phi), sin(phi), and
-// is for HWY's tags and pairs of them alike. Any input, NaN too, reads inside the tables.
+// Every function takes the stretched unit incident direction as cos(theta), sin(theta) >= 0, cos(phi),
+// sin(phi), and is for HWY's tags and pairs of them alike. Any input, NaN too, reads inside the tables.
 
 #if defined(FACETWISE_TABLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_TABLE_INL_H_
@@ -28,7 +28,7 @@ HWY_INLINE Vec<Twice<D>> ConvertTo(Twice<D> d, Pair<V> x) {
 }
 
 template <class D>
-using Index = Vec<Rebind<std::int32_t, D>>;
+using TableIndex = Vec<Rebind<std::int32_t, D>>;
 
 template <class V>
 HWY_INLINE V Between(V a, V b, V weight) {
@@ -37,11 +37,11 @@ HWY_INLINE V Between(V a, V b, V weight) {
 
 // Where a position lies between nodes 0 ... n - 1.
 template <class D, class V = Vec<D>>
-struct Place {
-  Index<D> cell;
+struct TablePlace {
+  TableIndex<D> cell;
   V weight;
-  HWY_INLINE Place() {}
-  HWY_INLINE Place(D d, V position, std::int32_t n) {
+  HWY_INLINE TablePlace() {}
+  HWY_INLINE TablePlace(D d, V position, std::int32_t n) {
     const Rebind<std::int32_t, D> di{};
     const V zero = Zero(d);
     const V inside = Select(position > zero, position, zero);
@@ -50,7 +50,7 @@ struct Place {
   }
 };
 
-// 1 + tan(half the angle of (cos, sin)), for cos >= 0 and their length, without cancellation where it is near 0.
+// 1 + tan(half the angle of (cos, sin)), for cos >= 0 and their length; near 0 nothing cancels.
 template <class D, class V = Vec<D>>
 HWY_INLINE V OnePlusHalfTangent(D d, V length, V cos, V sin) {
   const V one = Set(d, 1.0f);
@@ -62,12 +62,12 @@ HWY_INLINE V OnePlusHalfTangent(D d, V length, V cos, V sin) {
 
 // An incident direction and where it lies in the tables.
 template <class D, class V = Vec<D>>
-struct Incident {
+struct TableIncident {
   V cos_phi, sin_phi;
   V reach;  // 1 + the largest visible tan(chi / 2)
   V angle;  // phi as a diamond angle, [0, 4)
-  Place<D> azimuth;
-  HWY_INLINE Incident(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos, V sin)
+  TablePlace<D> azimuth;
+  HWY_INLINE TableIncident(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos, V sin)
       : cos_phi(cos), sin_phi(sin) {
     const V zero = Zero(d);
     reach = OnePlusHalfTangent(d, Set(d, 1.0f), Max(sin_theta, zero), cos_theta);
@@ -79,24 +79,28 @@ struct Incident {
     angle = Select(sin >= zero, half, Set(d, 4.0f) - half);
     azimuth = Turned(d, view.azimuths);
   }
-  HWY_INLINE Place<D> Turned(D d, std::int32_t azimuths) const {
-    return Place<D>(d, angle * Set(d, 0.25f * static_cast<float>(azimuths)), azimuths + 1);
+  HWY_INLINE TablePlace<D> Turned(D d, std::int32_t azimuths) const {
+    return TablePlace<D>(d, angle * Set(d, 0.25f * static_cast<float>(azimuths)), azimuths + 1);
   }
-  HWY_INLINE Place<D> At(D d, std::int32_t nodes) const {
-    return Place<D>(d, (Set(d, 1.0f) - reach * Set(d, 0.5f)) * Set(d, static_cast<float>(nodes - 1)), nodes);
+  HWY_INLINE TablePlace<D> At(D d, std::int32_t nodes) const {
+    return TablePlace<D>(d, (Set(d, 1.0f) - reach * Set(d, 0.5f)) * Set(d, static_cast<float>(nodes - 1)),
+                         nodes);
   }
 };
 
 // A row of nodes in u, linear between neighbouring rows and azimuths.
 template <class D, class V = Vec<D>>
-struct Row {
+struct TableRow {
   const float* table;
   std::int32_t next, turn;  // to the neighbouring row, and to that of the next azimuth, 0 if there is none
-  Index<D> offset, nearest;
+  TableIndex<D> offset, nearest;
   V outer, azimuth;
-  HWY_INLINE Row(D d, const SlopeTableView& view, const float* from, std::int32_t rows, const Place<D>& place,
-                 const Incident<D>& incident)
-      : table(from), next(view.uniforms + 1), turn(view.azimuths == 0 ? 0 : rows * next), outer(place.weight) {
+  HWY_INLINE TableRow(D d, const SlopeTableView& view, const float* from, std::int32_t rows,
+                      const TablePlace<D>& place, const TableIncident<D>& incident)
+      : table(from),
+        next(view.uniforms + 1),
+        turn(view.azimuths == 0 ? 0 : rows * next),
+        outer(place.weight) {
     const Rebind<std::int32_t, D> di{};
     const V half = Set(d, 0.5f), one = Set(d, 1.0f);
     offset = place.cell * Set(di, next);
@@ -105,39 +109,40 @@ struct Row {
     if (turn == 0) return;
     azimuth = incident.azimuth.weight;
     offset = offset + incident.azimuth.cell * Set(di, turn);
-    nearest =
-        nearest + (incident.azimuth.cell + ConvertTo(di, IfThenElseZero(azimuth > half, one))) * Set(di, turn);
+    nearest = nearest +
+              (incident.azimuth.cell + ConvertTo(di, IfThenElseZero(azimuth > half, one))) * Set(di, turn);
   }
-  HWY_INLINE V At(D d, Index<D> node) const {
-    const Index<D> at = offset + node;
+  HWY_INLINE V At(D d, TableIndex<D> node) const {
+    const TableIndex<D> at = offset + node;
     const V here = Between(GatherIndex(d, table, at), GatherIndex(d, table + next, at), outer);
     if (turn == 0) return here;
     const float* turned = table + turn;
-    return Between(here, Between(GatherIndex(d, turned, at), GatherIndex(d, turned + next, at), outer), azimuth);
+    return Between(here, Between(GatherIndex(d, turned, at), GatherIndex(d, turned + next, at), outer),
+                   azimuth);
   }
   // In the nearest row.
-  HWY_INLINE V Nearest(D d, Index<D> node) const { return GatherIndex(d, table, nearest + node); }
+  HWY_INLINE V Nearest(D d, TableIndex<D> node) const { return GatherIndex(d, table, nearest + node); }
   // Neighbouring nodes are apart, but may round to one value.
   HWY_INLINE V Width(D d, V low, V high) const { return Max(high - low, Set(d, 0x1p-24f)); }
 };
 
-// The value that u draws from a row, and its density there. Cells are counted from the nearer end: cell j ends at
-// 2 ((j + 1) / n)^2.
+// The value that u draws from a row, and its density there. Cells are counted from the nearer end: cell j
+// ends at 2 ((j + 1) / n)^2.
 template <class D, class V = Vec<D>>
-HWY_INLINE V DrawFrom(D d, const Row<D>& row, std::int32_t uniforms, V u, V& density) {
+HWY_INLINE V DrawFrom(D d, const TableRow<D>& row, std::int32_t uniforms, V u, V& density) {
   const Rebind<std::int32_t, D> di{};
   const float n = static_cast<float>(uniforms);
   const V one = Set(d, 1.0f), zero = Zero(d);
   const auto lower = u < Set(d, 0.5f);
   const V end = Select(lower, u, one - u);
   const V squares = Select(end > zero, end, zero) * Set(d, 0.5f * n * n);
-  const Index<D> j = ConvertTo(di, Min(Sqrt(squares), Set(d, 0.5f * n - 1.0f)));
+  const TableIndex<D> j = ConvertTo(di, Min(Sqrt(squares), Set(d, 0.5f * n - 1.0f)));
   const V from = ConvertTo(d, j);
   const V odd = Fma(from, Set(d, 2.0f), one);
   V within = Min(Max(NegFma(from, from, squares) / odd, zero), one);
   within = Select(lower, within, one - within);
   const V node = Select(lower, from, Set(d, n - 1.0f) - from);
-  const Index<D> k = ConvertTo(di, node);
+  const TableIndex<D> k = ConvertTo(di, node);
   const V low = row.At(d, k);
   const V high = row.At(d, k + Set(di, 1));
   density = odd * Set(d, 2.0f / (n * n)) / row.Width(d, low, high);
@@ -146,7 +151,7 @@ HWY_INLINE V DrawFrom(D d, const Row<D>& row, std::int32_t uniforms, V u, V& den
 
 // The density of DrawFrom() at a value.
 template <class D, class V = Vec<D>>
-HWY_INLINE V DensityFrom(D d, const Row<D>& row, std::int32_t uniforms, V value) {
+HWY_INLINE V DensityFrom(D d, const TableRow<D>& row, std::int32_t uniforms, V value) {
   const Rebind<std::int32_t, D> di{};
   const float n = static_cast<float>(uniforms);
   const V zero = Zero(d), one = Set(d, 1.0f), last = Set(d, n - 1.0f);
@@ -158,7 +163,7 @@ HWY_INLINE V DensityFrom(D d, const Row<D>& row, std::int32_t uniforms, V value)
   // The interpolated row's cell is that of the nearest row, or one near it.
   V low = zero, high = one;
   for (std::int32_t steps = 0; steps < uniforms; ++steps) {
-    const Index<D> k = ConvertTo(di, node);
+    const TableIndex<D> k = ConvertTo(di, node);
     low = row.At(d, k);
     high = row.At(d, k + Set(di, 1));
     const auto down = And(low > value, node > zero), up = And(high <= value, node < last);
@@ -170,24 +175,25 @@ HWY_INLINE V DensityFrom(D d, const Row<D>& row, std::int32_t uniforms, V value)
 }
 
 template <class D, class V = Vec<D>>
-HWY_INLINE Row<D> TiltRow(D d, const SlopeTableView& view, const Incident<D>& incident) {
-  return Row<D>(d, view, view.tilt, view.incidence, incident.At(d, view.incidence), incident);
+HWY_INLINE TableRow<D> TiltRow(D d, const SlopeTableView& view, const TableIncident<D>& incident) {
+  return TableRow<D>(d, view, view.tilt, view.incidence, incident.At(d, view.incidence), incident);
 }
 // `rise`: 1 + tan(chi / 2)
 template <class D, class V = Vec<D>>
-HWY_INLINE Row<D> SideRow(D d, const SlopeTableView& view, const Incident<D>& incident, V rise) {
-  const Place<D> place(d, rise * Set(d, 0.5f * static_cast<float>(view.slopes - 1)), view.slopes);
-  return Row<D>(d, view, view.side, view.slopes, place, incident);
+HWY_INLINE TableRow<D> SideRow(D d, const SlopeTableView& view, const TableIncident<D>& incident, V rise) {
+  const TablePlace<D> place(d, rise * Set(d, 0.5f * static_cast<float>(view.slopes - 1)), view.slopes);
+  return TableRow<D>(d, view, view.side, view.slopes, place, incident);
 }
 
 // A visible normal m, m_z > 0, and the density per solid angle with which the tables draw it.
 template <class D, class V = Vec<D>>
-HWY_INLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi,
-                                  V u1, V u2, V& mx, V& my, V& mz, V& density) {
+HWY_INLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
+                                  V sin_phi, V u1, V u2, V& mx, V& my, V& mz, V& density) {
   const V one = Set(d, 1.0f), two = Set(d, 2.0f), least = Set(d, 0x1p-22f);
-  const Incident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
+  const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
   V tilt, side;
-  const V rise = Max(DrawFrom(d, TiltRow(d, view, incident), view.uniforms, u1, tilt) * incident.reach, least);
+  const V rise =
+      Max(DrawFrom(d, TiltRow(d, view, incident), view.uniforms, u1, tilt) * incident.reach, least);
   const V s = rise - one;
   const V square = Fma(s, s, one);
   const V cos_chi = Max(rise * (two - rise) / square, least);
@@ -205,10 +211,10 @@ HWY_INLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, 
 
 // The density of DrawVisibleNormal() at a unit m: 0 where m_z <= 0 or m faces away from i.
 template <class D, class V = Vec<D>>
-HWY_INLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi,
-                                  V mx, V my, V mz) {
+HWY_INLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
+                                  V sin_phi, V mx, V my, V mz) {
   const V one = Set(d, 1.0f), zero = Zero(d);
-  const Incident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
+  const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
   const V along = Neg(Fma(cos_phi, mx, sin_phi * my));
   const V h = Fms(sin_phi, mx, cos_phi * my);
   const V length = Sqrt(Fma(along, along, mz * mz));
@@ -223,8 +229,8 @@ HWY_INLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, 
 
 // The same by slopes: x, y = -m_xy / m_z, densities per area of slopes.
 template <class D, class V = Vec<D>>
-HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi, V u1,
-                                 V u2, V& x, V& y, V& density) {
+HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
+                                 V sin_phi, V u1, V u2, V& x, V& y, V& density) {
   V mx, my, mz;
   DrawVisibleNormal(d, view, cos_theta, sin_theta, cos_phi, sin_phi, u1, u2, mx, my, mz, density);
   x = Neg(mx / mz);
@@ -232,8 +238,8 @@ HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V
   density = density * mz * mz * mz;
 }
 template <class D, class V = Vec<D>>
-HWY_INLINE V VisibleSlopeDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi, V x,
-                                 V y) {
+HWY_INLINE V VisibleSlopeDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
+                                 V sin_phi, V x, V y) {
   const V one = Set(d, 1.0f);
   const V mz = one / Sqrt(Fma(x, x, Fma(y, y, one)));
   const V density =
@@ -248,12 +254,14 @@ HWY_INLINE V NormalDensity(D d, const SlopeTableView& view, V mx, V my, V mz) {
   const V one = Set(d, 1.0f), scale = one / (one + mz);
   const float last = static_cast<float>(view.grid - 1);
   if (view.azimuths == 0) {
-    const Place<D> at(d, Sqrt(Fma(mx, mx, my * my)) * scale * Set(d, last), view.grid);
-    return Between(GatherIndex(d, view.density, at.cell), GatherIndex(d, view.density + 1, at.cell), at.weight);
+    const TablePlace<D> at(d, Sqrt(Fma(mx, mx, my * my)) * scale * Set(d, last), view.grid);
+    return Between(GatherIndex(d, view.density, at.cell), GatherIndex(d, view.density + 1, at.cell),
+                   at.weight);
   }
   const V half = Set(d, 0.5f * last);
-  const Place<D> x(d, NegFma(mx, scale, one) * half, view.grid), y(d, NegFma(my, scale, one) * half, view.grid);
-  const Index<D> at = y.cell * Set(di, view.grid) + x.cell;
+  const TablePlace<D> x(d, NegFma(mx, scale, one) * half, view.grid),
+      y(d, NegFma(my, scale, one) * half, view.grid);
+  const TableIndex<D> at = y.cell * Set(di, view.grid) + x.cell;
   const float *low = view.density, *high = view.density + view.grid;
   return Between(Between(GatherIndex(d, low, at), GatherIndex(d, low + 1, at), x.weight),
                  Between(GatherIndex(d, high, at), GatherIndex(d, high + 1, at), x.weight), y.weight);
@@ -272,9 +280,9 @@ HWY_INLINE V P22(D d, const SlopeTableView& view, V x, V y) {
 template <class D, class V = Vec<D>>
 HWY_INLINE V ProjectedArea(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi) {
   const V one = Set(d, 1.0f), zero = Zero(d);
-  const Incident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
-  const Place<D> at = incident.At(d, view.areas);
-  const auto between = [&](const float* row, Index<D> cell) HWY_ATTR {
+  const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
+  const TablePlace<D> at = incident.At(d, view.areas);
+  const auto between = [&](const float* row, TableIndex<D> cell) HWY_ATTR {
     return Between(GatherIndex(d, row, cell), GatherIndex(d, row + 1, cell), at.weight);
   };
   V ratio;
@@ -282,8 +290,8 @@ HWY_INLINE V ProjectedArea(D d, const SlopeTableView& view, V cos_theta, V sin_t
     ratio = between(view.area, at.cell);
   } else {
     const Rebind<std::int32_t, D> di{};
-    const Place<D> turn = incident.Turned(d, SlopeTableView::kAreaTurns * view.azimuths);
-    const Index<D> cell = turn.cell * Set(di, view.areas) + at.cell;
+    const TablePlace<D> turn = incident.Turned(d, SlopeTableView::kAreaTurns * view.azimuths);
+    const TableIndex<D> cell = turn.cell * Set(di, view.areas) + at.cell;
     ratio = Between(between(view.area, cell), between(view.area + view.areas, cell), turn.weight);
   }
   // (1 + cos) / 2, where that cancels by the sine.

@@ -33,8 +33,8 @@ TableSizes sizes_of(const SlopeTable::Options& options) {
           .azimuths = radial ? 0 : chosen(options.azimuths, 128)};
 }
 
-// D at the grid's nodes. Nodes at the disk's rim and outside, where slopes are infinite, have the value of their
-// azimuth's finite slope half a cell inside.
+// D at the grid's nodes. Nodes at the disk's rim and outside, where slopes are infinite, have the value of
+// their azimuth's finite slope half a cell inside.
 absl::Status evaluate(const SlopeDensity& p22, const TableSizes& sizes, std::span<float> density) {
   const bool radial = sizes.azimuths == 0;
   const double step = (radial ? 1.0 : 2.0) / (sizes.grid - 1), rim = 1 - step / 2;
@@ -47,8 +47,9 @@ absl::Status evaluate(const SlopeDensity& p22, const TableSizes& sizes, std::spa
     const double to_slope = 2 / (1 - wx * wx - wy * wy), x = wx * to_slope, y = wy * to_slope;
     const double value = p22(x, y);
     if (!std::isfinite(value) || value < 0)
-      return absl::InvalidArgumentError(absl::StrCat("p22: ", std::isfinite(value) ? "negative" : "not finite",
-                                                     " at slope (", x, ", ", y, "): ", value));
+      return absl::InvalidArgumentError(
+          absl::StrCat("p22: ", std::isfinite(value) ? "negative" : "not finite", " at slope (", x, ", ", y,
+                       "): ", value));
     const double squared = 1 + x * x + y * y;
     values[k] = value * squared * squared;
     if (!std::isfinite(values[k]))
@@ -62,9 +63,27 @@ absl::Status evaluate(const SlopeDensity& p22, const TableSizes& sizes, std::spa
   return absl::OkStatus();
 }
 
+// Whether a density that is said to be radial is, at some slopes and within what a user's grid rounds.
+absl::Status check_radial(const SlopeDensity& p22, const TableSizes& sizes, std::span<const float> density) {
+  constexpr std::size_t kRadii = 32;
+  for (std::size_t k = 1; k < kRadii; ++k) {
+    const std::size_t node = k * (sizes.grid - 1) / kRadii;
+    if (density[node] < 0.01f) continue;
+    const double w = static_cast<double>(node) / (sizes.grid - 1), r = 2 * w / (1 - w * w), here = p22(r, 0);
+    for (const auto& [cos, sin] : {Azimuth{-1, 0}, Azimuth{0, 1}, Azimuth{0, -1}, Azimuth{0.6, 0.8}})
+      if (const double there = p22(r * cos, r * sin); !(std::abs(there - here) <= 0.05 * here))
+        return absl::InvalidArgumentError(absl::StrCat("radial: p22 is ", here, " at slope (", r, ", 0) and ",
+                                                       there, " at (", r * cos, ", ", r * sin,
+                                                       "); build without it"));
+  }
+  return absl::OkStatus();
+}
+
 // Gauss-Legendre, 4 points on [0, 1].
-constexpr double kPoint[] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263};
-constexpr double kWeight[] = {0.17392742256872692, 0.32607257743127308, 0.32607257743127308, 0.17392742256872692};
+constexpr double kPoint[] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281,
+                             0.9305681557970263};
+constexpr double kWeight[] = {0.17392742256872692, 0.32607257743127308, 0.32607257743127308,
+                              0.17392742256872692};
 
 // The integral of D m_z over the hemisphere, that is of P22: cell by cell of the grid.
 double integral(const SlopeTableView& view) {
@@ -118,8 +137,8 @@ class Work {
   double total_, done_ = 0, told_ = 0;
 };
 
-// Where the integral of a density, linear between equidistant values on [0, 1], reaches the nodes in u. False,
-// and nothing done, if it is 0.
+// Where the integral of a density, linear between equidistant values on [0, 1], reaches the nodes in u.
+// False, and nothing done, if it is 0.
 bool invert(std::span<const double> density, std::size_t uniforms, std::span<double> nodes) {
   double total = 0;
   for (std::size_t k = 0; k + 1 < density.size(); ++k) total += (density[k] + density[k + 1]) / 2;
@@ -183,11 +202,12 @@ class Builder {
 
   absl::Status run(const SlopeDensity& p22, const std::function<void(double)>& progress) {
     if (auto status = evaluate(p22, sizes_, {density_, sizes_.density()}); !status.ok()) return status;
+    if (radial_)
+      if (auto status = check_radial(p22, sizes_, {density_, sizes_.density()}); !status.ok()) return status;
     const double whole = integral(view_);
     if (!std::isfinite(whole)) return absl::InvalidArgumentError("p22: integral is not finite");
     if (!(whole > 0)) return absl::InvalidArgumentError("p22: integral is 0");
-    for (std::size_t k = 0; k < sizes_.density(); ++k)
-      density_[k] = static_cast<float>(density_[k] / whole);
+    for (std::size_t k = 0; k < sizes_.density(); ++k) density_[k] = static_cast<float>(density_[k] / whole);
 
     // Costs: of one evaluation of the density, and of one of the marginal.
     const double look = static_cast<double>(sides_), fold = static_cast<double>(steps_) / 2;
@@ -196,7 +216,8 @@ class Builder {
               static_cast<double>(turns()) * (look * static_cast<double>(tilts) + fold * sizes_.areas) +
                   static_cast<double>(rows()) * (2 * look * sizes_.slopes + fold * sizes_.incidence));
     work.each(turns() * tilts, look, [&](std::size_t k) { make_marginal(k / tilts, k % tilts); });
-    work.each(turns() * sizes_.areas, fold, [&](std::size_t k) { make_area(k / sizes_.areas, k % sizes_.areas); });
+    work.each(turns() * sizes_.areas, fold,
+              [&](std::size_t k) { make_area(k / sizes_.areas, k % sizes_.areas); });
     work.each(rows() * sizes_.incidence, fold,
               [&](std::size_t k) { make_tilt(k / sizes_.incidence, k % sizes_.incidence); });
     work.each(rows() * sizes_.slopes, 2 * look,
@@ -230,8 +251,8 @@ class Builder {
     marginal_[turn * (tilts_ + 1) + k] = sum * pi / static_cast<double>(sides_);
   }
 
-  // The visible normals' density in f, s = -1 + f reach, where reach is 1 more than the largest s. At theta = pi
-  // reach is 0 and the limit is meant.
+  // The visible normals' density in f, s = -1 + f reach, where reach is 1 more than the largest s. At theta =
+  // pi reach is 0 and the limit is meant.
   static constexpr double kSmallestReach = 1e-6;
   void visible(std::size_t turn, double reach, std::span<double> out) const {
     const double* marginal = marginal_.data() + turn * (tilts_ + 1);
@@ -280,10 +301,12 @@ class Builder {
     const std::size_t n = 2 * sides_;
     std::vector<double> density(n + 1), nodes(sizes_.uniforms + 1);
     const auto fill = [&](const auto& value) {
-      for (std::size_t j = 1; j < n; ++j) density[j] = value(cos_psi_[j], sin_psi_[j]) * cos_psi_[j] * cos_psi_[j];
+      for (std::size_t j = 1; j < n; ++j)
+        density[j] = value(cos_psi_[j], sin_psi_[j]) * cos_psi_[j] * cos_psi_[j];
       return invert(density, sizes_.uniforms, nodes);
     };
-    if (!fill([&](double c, double h) { return look(frame, s, c, h); })) fill([](double, double) { return 1.0; });
+    if (!fill([&](double c, double h) { return look(frame, s, c, h); }))
+      fill([](double, double) { return 1.0; });
     for (double& node : nodes) node = std::sin(pi * (node - 0.5));
     store(nodes, -1, 1, side_ + (row * sizes_.slopes + k) * (sizes_.uniforms + 1));
   }
@@ -332,8 +355,9 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::build(const SlopeD
 }
 
 absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::from_grid(std::span<const double> values,
-                                                                        std::size_t nx, std::size_t ny, Range x,
-                                                                        Range y, const Options& options) {
+                                                                        std::size_t nx, std::size_t ny,
+                                                                        Range x, Range y,
+                                                                        const Options& options) {
   const auto wrong = [](auto... parts) { return absl::InvalidArgumentError(absl::StrCat(parts...)); };
   if (nx < 2 || ny < 2) return wrong("values: ", nx, " times ", ny, " slopes; at least 2 times 2 are needed");
   if (values.size() % nx != 0 || values.size() / nx != ny)

@@ -2,8 +2,8 @@
 //
 // A normal has a tilt chi in the plane of incidence and a side h across it:
 //   m = (-sin(chi) c, -h, cos(chi) c), c = sqrt(1 - h^2), in the frame turned by phi;
-// an area of the sphere is d(chi) dh, and i.m = c cos(chi + theta). Kernels have s = tan(chi / 2) in [-1, 1], whose
-// largest visible value is tan(pi/4 - theta/2) = cos(theta) / (1 + sin(theta)).
+// an area of the sphere is d(chi) dh, and i.m = c cos(chi + theta). Kernels have s = tan(chi / 2) in [-1, 1],
+// whose largest visible value is tan(pi/4 - theta/2) = cos(theta) / (1 + sin(theta)).
 #pragma once
 
 #include <cstddef>
@@ -45,8 +45,8 @@ inline double u_node(std::size_t k, std::size_t n) {
   return v <= 0.5 ? 2 * v * v : 1 - 2 * (1 - v) * (1 - v);
 }
 
-// The frame's azimuth at node `row` of n: nodes are equidistant in the diamond angle, which is sin / (|sin| + |cos|)
-// in the first quarter and needs no arc tangent.
+// The frame's azimuth at node `row` of n: nodes are equidistant in the diamond angle, which is sin / (|sin| +
+// |cos|) in the first quarter and needs no arc tangent.
 struct Azimuth {
   double cos, sin;
 };
