@@ -16,7 +16,7 @@ double skewed(double x, double y);
 // Fails the test, and returns nothing, where the table cannot be built.
 std::shared_ptr<const SlopeTable> build(const SlopeDensity& p22, const SlopeTable::Options& options);
 
-// Built once per process, with default sizes.
+// Built once per process, with default sizes unless kQuick.
 const SlopeTable& ggx_table();
 const SlopeTable& beckmann_table();
 const SlopeTable& skewed_table();

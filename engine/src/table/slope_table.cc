@@ -103,14 +103,19 @@ double SlopeTable::projected_area(double theta, double phi) const {
   // Midpoints in chi and psi, over the visible tilts alone.
   constexpr int kTilts = 1000, kSides = 1000;
   const double from = -pi / 2, width = pi - theta, c = std::cos(phi), s = std::sin(phi);
+  double cos_psi[kSides], sin_psi[kSides];
+  for (int j = 0; j < kSides; ++j) {
+    const double psi = pi * ((j + 0.5) / kSides - 0.5);
+    cos_psi[j] = std::cos(psi), sin_psi[j] = std::sin(psi);
+  }
   double sum = 0;
   for (int k = 0; k < kTilts; ++k) {
     const double chi = from + width * (k + 0.5) / kTilts, lit = std::cos(chi + theta);
+    const double cos_chi = std::cos(chi), sin_chi = std::sin(chi);
     for (int j = 0; j < kSides; ++j) {
-      const double psi = pi * ((j + 0.5) / kSides - 0.5), cos_psi = std::cos(psi);
-      const double scale = 1 / (1 + std::cos(chi) * cos_psi);
-      const double wx = std::sin(chi) * cos_psi * scale, wy = std::sin(psi) * scale;
-      sum += normal_density(view_, c * wx - s * wy, s * wx + c * wy) * cos_psi * cos_psi * lit;
+      const double scale = 1 / (1 + cos_chi * cos_psi[j]);
+      const double wx = sin_chi * cos_psi[j] * scale, wy = sin_psi[j] * scale;
+      sum += normal_density(view_, c * wx - s * wy, s * wx + c * wy) * cos_psi[j] * cos_psi[j] * lit;
     }
   }
   return sum * width / kTilts * pi / kSides;
