@@ -43,5 +43,10 @@ const SlopeTable& skewed_table() {
   static const auto table = build(skewed, kQuick ? small : SlopeTable::Options{});
   return *table;
 }
+const SlopeTable& coarse_table() {
+  static const auto table =
+      build(skewed, {.grid = 65, .incidence = 9, .slopes = 9, .uniforms = 32, .azimuths = 4});
+  return *table;
+}
 
 }  // namespace facetwise::test

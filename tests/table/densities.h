@@ -20,5 +20,7 @@ std::shared_ptr<const SlopeTable> build(const SlopeDensity& p22, const SlopeTabl
 const SlopeTable& ggx_table();
 const SlopeTable& beckmann_table();
 const SlopeTable& skewed_table();
+// The skewed density in few azimuths: quick to build, for tests that do not ask how exact it is.
+const SlopeTable& coarse_table();
 
 }  // namespace facetwise::test
