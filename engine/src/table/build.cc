@@ -213,10 +213,10 @@ class Builder {
     const double look = static_cast<double>(sides_), fold = static_cast<double>(steps_) / 2;
     const std::size_t tilts = tilts_ + 1;
     Work work(progress,
-              static_cast<double>(turns()) * (look * static_cast<double>(tilts) + fold * sizes_.areas) +
+              static_cast<double>(turns()) * (look * static_cast<double>(tilts) + fold / 4 * sizes_.areas) +
                   static_cast<double>(rows()) * (2 * look * sizes_.slopes + fold * sizes_.incidence));
     work.each(turns() * tilts, look, [&](std::size_t k) { make_marginal(k / tilts, k % tilts); });
-    work.each(turns() * sizes_.areas, fold,
+    work.each(turns() * sizes_.areas, fold / 4,
               [&](std::size_t k) { make_area(k / sizes_.areas, k % sizes_.areas); });
     work.each(rows() * sizes_.incidence, fold,
               [&](std::size_t k) { make_tilt(k / sizes_.incidence, k % sizes_.incidence); });
@@ -271,12 +271,13 @@ class Builder {
   void make_area(std::size_t turn, std::size_t k) {
     const double reach =
         std::max(2 - 2 * static_cast<double>(k) / static_cast<double>(sizes_.areas - 1), kSmallestReach);
-    std::vector<double> density(steps_ + 1);
+    constexpr std::size_t kSteps = 512;
+    double density[kSteps + 1];
     visible(turn, reach, density);
     // Simpson's rule.
-    double sum = density.front() + density.back();
-    for (std::size_t j = 1; j < steps_; ++j) sum += density[j] * (j % 2 == 1 ? 4 : 2);
-    const double area = sum / 3 / static_cast<double>(steps_) * reach;
+    double sum = density[0] + density[kSteps];
+    for (std::size_t j = 1; j < kSteps; ++j) sum += density[j] * (j % 2 == 1 ? 4 : 2);
+    const double area = sum / 3 / static_cast<double>(kSteps) * reach;
     // 1 + cos(theta) = reach^2 / (1 + largest^2)
     const double largest = reach - 1;
     area_[turn * sizes_.areas + k] = static_cast<float>(area * 2 * (1 + largest * largest) / (reach * reach));
