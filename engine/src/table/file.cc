@@ -1,0 +1,185 @@
+// Tables as bytes and files, and slopes as text.
+//
+// The bytes: 8 of magic, the version and the six sizes of TableSizes as uint32, 4 bytes of 0, the values as
+// float32, and the FNV-1a hash of all before as uint64; little-endian.
+#include <unistd.h>
+
+#include <bit>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "facetwise/slope_table.h"
+#include "src/table/layout.h"
+
+namespace facetwise {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "values are written as they lie in memory");
+
+constexpr char kMagic[] = {'f', 'w', 's', 'l', 'o', 'p', 'e', '\x1a'};
+constexpr std::uint32_t kVersion = 1;
+struct Header {
+  char magic[8];
+  std::uint32_t version;
+  TableSizes sizes;
+  std::uint32_t zero;
+};
+static_assert(sizeof(Header) == 40 && sizeof(TableSizes) == 24);
+constexpr char kTextMagic[] = "facetwise-slopes";
+
+template <class... Parts>
+absl::Status invalid(const Parts&... parts) {
+  return absl::InvalidArgumentError(absl::StrCat(parts...));
+}
+
+absl::Status of_file(const std::string& path, const absl::Status& status) {
+  return absl::Status(status.code(), absl::StrCat(path, ": ", status.message()));
+}
+
+// What builders make: kernels need no more than sizes in order, but a sample needs rows that rise.
+absl::Status check_values(const TableSizes& sizes, std::span<const float> values) {
+  for (std::size_t k = 0; k < sizes.density() + sizes.area(); ++k)
+    if (!std::isfinite(values[k]) || values[k] < 0)
+      return invalid("a density or area of ", values[k], "; rebuild it");
+  const auto rows = values.subspan(sizes.density() + sizes.area());
+  const std::size_t nodes = std::size_t{sizes.uniforms} + 1;
+  for (std::size_t row = 0; row < rows.size(); row += nodes) {
+    const float first = row < sizes.tilt() ? 0.0f : -1.0f;
+    bool rises = rows[row] == first && rows[row + nodes - 1] == 1;
+    for (std::size_t k = 1; k < nodes; ++k) rises = rises && rows[row + k] >= rows[row + k - 1];
+    if (!rises) return invalid("a row of samples does not rise; rebuild it");
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> read_file(const std::string& path) {
+  std::FILE* file = std::fopen(path.c_str(), "rb");
+  if (file == nullptr)
+    return absl::NotFoundError(absl::StrCat(path, ": cannot open: ", std::strerror(errno)));
+  std::string bytes;
+  char block[1 << 16];
+  for (std::size_t n; (n = std::fread(block, 1, sizeof block, file)) > 0;) bytes.append(block, n);
+  const bool failed = std::ferror(file) != 0;
+  const int error = errno;
+  std::fclose(file);
+  if (failed) return invalid(path, ": cannot read: ", std::strerror(error));
+  return bytes;
+}
+
+// The next word of a text, empty at the end.
+std::string_view next_word(std::string_view& text) {
+  constexpr std::string_view kSpace = " \t\r\n";
+  const std::size_t from = text.find_first_not_of(kSpace);
+  text.remove_prefix(from == text.npos ? text.size() : from);
+  const std::string_view word = text.substr(0, text.find_first_of(kSpace));
+  text.remove_prefix(word.size());
+  return word;
+}
+template <class T>
+bool read_number(std::string_view& text, T& value) {
+  const std::string_view word = next_word(text);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc{} && end == word.data() + word.size() && !word.empty();
+}
+
+absl::StatusOr<std::shared_ptr<const SlopeTable>> build_text(std::string_view text,
+                                                             const SlopeTable::Options& options) {
+  next_word(text);
+  std::size_t version = 0, nx = 0, ny = 0;
+  SlopeTable::Range x{}, y{};
+  if (!read_number(text, version) || version != 1)
+    return invalid("the first line is not \"facetwise-slopes 1 nx ny x_min x_max y_min y_max\"");
+  if (!read_number(text, nx) || !read_number(text, ny) || !read_number(text, x.from) ||
+      !read_number(text, x.to) || !read_number(text, y.from) || !read_number(text, y.to))
+    return invalid("the first line needs \"nx ny x_min x_max y_min y_max\" after the version");
+  // Each value is a digit and a space at least.
+  if (nx == 0 || ny == 0 || nx > text.size() || ny > (text.size() / 2 + 1) / nx)
+    return invalid("the first line announces ", nx, " times ", ny, " values, more than there are");
+  std::vector<double> values(nx * ny);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (!read_number(text, values[k]))
+      return invalid("value ", k + 1, " of ", values.size(), " is not a number");
+  if (!next_word(text).empty()) return invalid("more than ", values.size(), " values");
+  return SlopeTable::from_grid(values, nx, ny, x, y, options);
+}
+
+}  // namespace
+
+std::string SlopeTable::serialise() const {
+  Header header{{}, kVersion, SlopeTableMaker::sizes(*this), 0};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  std::string bytes(reinterpret_cast<const char*>(&header), sizeof header);
+  bytes.append(reinterpret_cast<const char*>(values_.data()), this->bytes());
+  const std::uint64_t hash = fnv1a(bytes.data(), bytes.size());
+  bytes.append(reinterpret_cast<const char*>(&hash), sizeof hash);
+  return bytes;
+}
+
+absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::parse(std::string_view bytes) {
+  Header header;
+  std::uint64_t hash;
+  if (bytes.size() < sizeof kMagic || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
+    return invalid("not a table of slopes; make one with SlopeTable::save");
+  if (bytes.size() < sizeof header + sizeof hash)
+    return invalid("truncated: ", bytes.size(), " bytes; copy it again or rebuild it");
+  std::memcpy(&header, bytes.data(), sizeof header);
+  if (header.version != kVersion)
+    return invalid("version ", header.version, "; this facetwise reads version ", kVersion,
+                   ": rebuild the table");
+  if (auto status = check_sizes(header.sizes); !status.ok())
+    return invalid("corrupted (", status.message(), "); copy it again or rebuild it");
+  const std::size_t size = sizeof header + header.sizes.total() * sizeof(float) + sizeof hash;
+  if (bytes.size() < size)
+    return invalid("truncated: ", bytes.size(), " bytes of ", size, "; copy it again or rebuild it");
+  if (bytes.size() > size)
+    return invalid("corrupted: ", bytes.size(), " bytes instead of ", size, "; copy it again or rebuild it");
+  std::memcpy(&hash, bytes.data() + size - sizeof hash, sizeof hash);
+  if (header.zero != 0 || hash != fnv1a(bytes.data(), size - sizeof hash))
+    return invalid("corrupted: its hash is another; copy it again or rebuild it");
+  std::vector<float> values(header.sizes.total());
+  std::memcpy(values.data(), bytes.data() + sizeof header, values.size() * sizeof(float));
+  if (auto status = check_values(header.sizes, values); !status.ok()) return status;
+  return SlopeTableMaker::make(header.sizes, std::move(values));
+}
+
+absl::Status SlopeTable::save(const std::string& path) const {
+  // Beside its place, then renamed: a reader never sees half a table.
+  std::string temporary = absl::StrCat(path, ".XXXXXX");
+  const int descriptor = ::mkstemp(temporary.data());
+  if (descriptor < 0) return invalid(path, ": cannot create: ", std::strerror(errno));
+  ::close(descriptor);
+  std::FILE* file = std::fopen(temporary.c_str(), "wb");
+  const std::string bytes = serialise();
+  bool written = file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+  if (file != nullptr) written = std::fclose(file) == 0 && written;
+  if (written && std::rename(temporary.c_str(), path.c_str()) == 0) return absl::OkStatus();
+  const int error = errno;
+  ::unlink(temporary.c_str());
+  return invalid(path, ": cannot write: ", std::strerror(error));
+}
+
+absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::load(const std::string& path) {
+  const auto bytes = read_file(path);
+  if (!bytes.ok()) return bytes.status();
+  auto table = parse(*bytes);
+  if (!table.ok()) return of_file(path, table.status());
+  return table;
+}
+
+absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::load_any(const std::string& path,
+                                                                       const Options& options) {
+  const auto bytes = read_file(path);
+  if (!bytes.ok()) return bytes.status();
+  if (bytes->rfind(kMagic, 0, sizeof kMagic) != 0 && bytes->rfind(kTextMagic, 0) != 0)
+    return invalid(path, ": neither a saved table nor text that begins with \"", kTextMagic, "\"");
+  auto table = bytes->rfind(kTextMagic, 0) == 0 ? build_text(*bytes, options) : parse(*bytes);
+  if (!table.ok()) return of_file(path, table.status());
+  return table;
+}
+
+}  // namespace facetwise
