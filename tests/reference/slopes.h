@@ -164,10 +164,16 @@ double over_normals(const Surface& s, Vector i, const F& f, bool of_values = fal
                       std::sqrt(std::min(half, falls_over(s, to))) / 2, 10);
       from = to;
     }
-    const double scale = falls_over(s, from);
-    for (int n = 0; n < 4; ++n)
-      sum += panel([&](double v) { return at(from + scale * v / (1 - v)) * scale / ((1 - v) * (1 - v)); },
-                   n / 4.0, (n + 1) / 4.0, 12);
+    // Phong's decay differs with the azimuth.
+    const bool phong = s.model.distribution == Distribution::phong;
+    const double scale = phong ? 1 : falls_over(s, from);
+    const int panels = phong ? 10 : 4;
+    for (int n = 0; n < panels; ++n) {
+      const auto mapped = [&](double v) {
+        return at(from + scale * v / (1 - v)) * scale / ((1 - v) * (1 - v));
+      };
+      sum += panel(mapped, static_cast<double>(n) / panels, (n + 1.0) / panels, 12);
+    }
     return sum;
   };
 
