@@ -78,7 +78,7 @@ double projected_area(const Surface& surface, Vector i);
 double masking(const Surface& surface, Vector i);
 // V-cavity G(i, m) = min(2 m_z |i_z| / i.m, 1); 0 for i.m <= 0.
 double vcavity_masking(Vector i, Vector m);
-// V-cavity: share H(i) of rays that hit, 1 for i_z >= 0; ggx and beckmann have forms that keep their digits.
+// V-cavity: share H(i) of rays that hit, 1 for i_z >= 0. Phong and tables: a difference of areas by quadrature.
 // Model::normalisation plays no part.
 double hit_probability(const Surface& surface, Vector i);
 // What densities of visible normals are divided by. Smith: p(m) = D (i.m)+ / normaliser, sigma(i) or, biased, that

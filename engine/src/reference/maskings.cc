@@ -42,6 +42,15 @@ Scaled hits(const Surface& surface, Vector i) {
       if (t > 0.5L) return {(ierfcx(t) - std::exp(-8 * t * t) * ierfcx(3 * t)) / (2 * t), -t * t};
       return {integrate([&](Real v) { return std::erfc(t * v); }, 1, 3, 0) / 2, 0};
     }
+    case Distribution::student_t:
+      // Likewise the mean of twice the share of slopes that face i, (1 + tau)^2 (2 - tau) / 2.
+      return {integrate(
+                  [&](Real v) {
+                    const Real nu = std::sqrt(2 * a2 + z * z * v * v), front = 2 * a2 / ((nu + z * v) * nu);
+                    return front * front * (3 - front) / 4;
+                  },
+                  1, 3, 0),
+              0};
     default:
       return {(value(area(surface, w)) - value(area(surface, {w.x, w.y, 3 * w.z}))) / z, 0};
   }
