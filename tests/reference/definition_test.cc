@@ -37,6 +37,11 @@ std::vector<Surface> surfaces() {
     s.mean_slope_y = -1.2;
     all.push_back(s);
   }
+  if (kQuick) {
+    std::vector<Surface> some;
+    for (std::size_t n = 0; n < all.size(); n += 6) some.push_back(all[n]);
+    return some;
+  }
   return all;
 }
 

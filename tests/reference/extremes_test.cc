@@ -116,8 +116,8 @@ TEST(Extremes, AnisotropicBeckmann) {
     Surface s;
     s.model.distribution = Distribution::beckmann;
     s.alpha = alpha;
-    for (double theta : {30.0, 80.0}) {
-      for (double phi : {0.0, 2.0, 45.0, 89.0}) {
+    for (double theta : kQuick ? std::vector<double>{80} : std::vector<double>{30, 80}) {
+      for (double phi : kQuick ? std::vector<double>{2} : std::vector<double>{0, 2, 45, 89}) {
         const Vector i = direction(theta, phi);
         const double sum = over_normals(s, i, [&](Vector m, double im) {
           const Vector o = {2 * im * m.x - i.x, 2 * im * m.y - i.y, 2 * im * m.z - i.z};
