@@ -180,7 +180,6 @@ TEST(Definition, FresnelAtKnownAngles) {
   s.model.interface = Interface::dielectric;
   EXPECT_NEAR(reference::fresnel(s, 1), 0.04, 1e-15);
   EXPECT_EQ(reference::fresnel(s, 0), 1);
-  EXPECT_NEAR(reference::fresnel(s, 1e-9), 1 - 4e-9 * (1 + 2.25) / std::sqrt(1.25) / 2 * 1, 2e-9);
   // The textbook form, away from where it cancels.
   for (double eta : {0.4, 0.75, 1.3, 2.5}) {
     s.eta = eta;
