@@ -8,6 +8,7 @@
 #endif
 
 #include "src/kernels/operations-inl.h"
+#include "src/kernels/scatter-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -28,6 +29,10 @@ struct Registrar {
     using T = std::conditional_t<Drawer::kExact, Pairs, D>;
     kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
     kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
+    if constexpr (Drawer::kNormals) {
+      kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;
+      kernels.scatter_query[index] = ForEachVector<D, ScatterQuery<D, S, Drawer>>;
+    }
     return *this;
   }
   // A second name, or a sampler that has another's density.
@@ -36,6 +41,8 @@ struct Registrar {
     const auto index = static_cast<std::size_t>(sampler);
     kernels.sample[index] = ForEachVector<D, Sample<D, S, Drawer>>;
     kernels.query[index] = ForEachVector<D, Query<D, S, SameDensity>>;
+    kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;
+    kernels.scatter_query[index] = ForEachVector<D, ScatterQuery<D, S, SameDensity>>;
     return *this;
   }
 };

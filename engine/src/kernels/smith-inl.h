@@ -78,6 +78,12 @@ struct Smith {
     return lit / all;
   }
 
+  // 2 N of visible normals.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V VisibleTwoN(D, const I& i, V, V) {
+    return i.tn;
+  }
+
   // What a direction o below the surface sees of the microfacets that transmit to it: G1 of -o.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V TransmissionMasking(D d, const I& i, V, V, V, V ox, V oy, V oz) {

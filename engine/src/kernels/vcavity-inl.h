@@ -69,6 +69,15 @@ struct VCavity {
     }
   }
 
+  // 2 N of visible normals.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_INLINE V VisibleTwoN(D d, const I& i, V mz, V im) {
+    const V iz = Max(Abs(i.z), Set(d, 0x1p-60f));
+    const V n = Max(im / (mz + mz), iz);
+    if constexpr (I::Distribution::kCavityBehind) return i.tn * n;
+    return Select(i.front, i.tn * n, Set(d, 3e38f));
+  }
+
   // The same microfacet seen from both sides is masked alike: G(o, m) / G(i, m) beyond G(i, m).
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V TransmissionMasking(D d, const I& i, V mz, V im, V om, V, V, V oz) {
@@ -100,10 +109,7 @@ struct CavityVisible : SlopeNormals, VisibleNormals {
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V TwoN(D d, const I& i, V, V, V mz, V im) {
-    const V iz = Max(Abs(i.z), Set(d, 0x1p-60f));
-    const V n = Max(im / (mz + mz), iz);
-    if constexpr (I::Distribution::kCavityBehind) return i.tn * n;
-    return Select(i.front, i.tn * n, Set(d, 3e38f));
+    return VCavity::VisibleTwoN(d, i, mz, im);
   }
 
   // u3 becomes what the choice leaves of it.

@@ -1,0 +1,304 @@
+// A dielectric's two events at a microfacet: reflection and transmission (Walter 2007), chosen by u3 or forced to transmit.
+//
+// c = i.m; g = eta cos of the refracted direction; F the reflectance. The refracted direction is
+// o = (-i + (c - g) m) / eta, where c - g = (1 - eta^2) / (c + g) does not cancel, and
+// p(o) = p(m) eta^2 |o.m| / (i.m + eta o.m)^2 = p(m) eta g / (c - g)^2.
+
+#if defined(FACETWISE_SCATTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_SCATTER_INL_H_
+#undef FACETWISE_SCATTER_INL_H_
+#else
+#define FACETWISE_SCATTER_INL_H_
+#endif
+
+#include "src/kernels/operations-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+// A microfacet normal m seen from i: its reflectance, and where refraction goes.
+template <class D>
+struct Refraction {
+  using V = Vec<D>;
+  V f, g, bend;  // bend: c - g
+  HWY_INLINE Refraction(D d, V c, V eta) {
+    f = DielectricReflectance(d, c, eta, g);
+    bend = (Set(d, 1.0f) - eta) * (Set(d, 1.0f) + eta) / Max(c + g, Set(d, 0x1p-40f));
+  }
+  // A component of the refracted direction.
+  HWY_INLINE V Direction(V i, V m, V inverse_eta) const { return Fms(bend, m, i) * inverse_eta; }
+};
+
+// Lanes with eta = 1 go straight on, like smooth ones.
+template <class D>
+HWY_INLINE Mask<D> Unbent(D d, const Tile& tile, std::size_t lane) {
+  return LoadU(d, tile.in[kEta] + lane) == Set(d, 1.0f);
+}
+
+// sample_scattering and sample_transmission.
+template <class D, class S, class Sampler>
+struct Scatter {
+  using V = Vec<D>;
+  SampleInputs<D, S, Sampler::kUsesU3> in;
+  V u3;
+
+  HWY_INLINE Scatter(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane), u3(in.u3) {
+    if (!tile.transmits) u3 = LoadU(d, tile.in[kU3] + lane);
+  }
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
+    return in.AllOrdinary(d, tile, lane) && AllTrue(d, InUnitInterval(d, u3)) && AllFalse(d, Unbent(d, tile, lane));
+  }
+
+  template <bool kFast>
+  HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
+    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, 3e38f);
+    const V loaded_eta = LoadU(d, tile.in[kEta] + lane);
+    Policy<D> policy;
+    if constexpr (!kFast) {
+      policy = in.Classified(d, tile, lane);
+      policy.valid = And(policy.valid, InUnitInterval(d, u3));
+      policy.smooth = And(policy.valid, Or(policy.smooth, Unbent(d, tile, lane)));
+    }
+    const Exceptions<D, kFast> exceptions(d, policy);
+    const Incident<D, S> i = in.Prepared(d, tile, exceptions);
+    const V eta = exceptions.Harmless(loaded_eta, 1.5f), inverse_eta = one / eta;
+
+    Drawn<D> drawn;
+    V choice = exceptions.Harmless(u3, 0.0f);
+    Sampler::Draw(d, i, exceptions.Harmless(in.u1, 0.0f), exceptions.Harmless(in.u2, 0.0f), choice, drawn);
+    if (tile.transmits) choice = zero;
+
+    const V inverse_length = one / Sqrt(drawn.mm);
+    const V mx = drawn.mx * inverse_length, my = drawn.my * inverse_length, mz = drawn.mz * inverse_length;
+    const V c = Min(Max(drawn.im, Set(d, kSmallestIm)) * inverse_length, one);
+    auto seen = drawn.im > (Sampler::kVisible ? zero : Set(d, kSmallestIm));
+    if constexpr (Sampler::kVisible) seen = Not(NoLanes(d));
+    if (!i.all_front) seen = AndNot(S::Masking::Blind(d, i), seen);
+
+    // Both events.
+    V rho = (drawn.im + drawn.im) / drawn.mm;
+    if constexpr (!Sampler::kUnit) rho = Max(rho, Set(d, kSmallestRho<S>));
+    V rx = Fms(rho, drawn.mx, i.x), ry = Fms(rho, drawn.my, i.y);
+    const V rz = Fms(rho, drawn.mz, i.z);
+    const Refraction<D> refraction(d, c, eta);
+    V tx = refraction.Direction(i.x, mx, inverse_eta), ty = refraction.Direction(i.y, my, inverse_eta),
+      tz = refraction.Direction(i.z, mz, inverse_eta);
+    // A small eta makes the length inexact.
+    const V scale = NegFma(Set(d, 0.5f), Dot(tx, ty, tz, tx, ty, tz), Set(d, 1.5f));
+    tx = tx * scale;
+    ty = ty * scale;
+    tz = tz * scale;
+
+    const auto reflectable = And(seen, rz > zero);
+    const auto refractable = And(And(seen, tz < zero), refraction.g > zero);
+    V reflected = IfThenElseZero(reflectable, refraction.f);
+    const V rest = one - refraction.f;
+    V transmitted = IfThenElseZero(refractable, rest);
+    if (tile.transmits) reflected = zero;
+    const V total = reflected + transmitted;
+    // A chosen event is a valid one, however u3 total rounds.
+    const auto reflects = And(Or(choice * total < reflected, transmitted <= zero), Not(Forced(d, tile)));
+    const auto accepted = total > zero;
+    const V branch = IfThenElseZero(accepted, Select(reflects, reflected, transmitted) / total);
+
+    const V ox = Select(reflects, rx, tx), oy = Select(reflects, ry, ty), oz = Select(reflects, rz, tz);
+
+    V pdf = zero;
+    if (tile.wanted & kWantsPdf) {
+      V numerator, denominator;
+      Sampler::Density(d, i, drawn, rho, numerator, denominator);
+      denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
+      const V jacobian = Select(reflects, one, four * c * eta * (refraction.g / (refraction.bend * refraction.bend)));
+      pdf = IfThenElseZero(accepted, Min(Min(numerator / denominator, largest) * jacobian * branch, largest));
+    }
+    StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
+
+    const V radiance = tile.importance ? one : inverse_eta * inverse_eta;
+    const Mirror mirror(d, in, tile, loaded_eta, u3);
+    if (tile.wanted & kWantsWeight) {
+      const V reflected_weight = S::Masking::template Weight<Sampler>(d, i, drawn, rx, ry, rz, tile.uncorrelated);
+      V transmitted_weight = S::Masking::TransmissionMasking(d, i, mz, c, refraction.g * inverse_eta, tx, ty, tz);
+      if constexpr (!Sampler::kNIsSigma) {
+        V numerator = drawn.two_n;
+        if constexpr (S::Distribution::kShifts && !Sampler::kShifted)
+          if (!i.all_front) numerator = numerator * Exp(d, i.shift);
+        transmitted_weight = transmitted_weight * (numerator / S::Masking::VisibleTwoN(d, i, mz, c));
+      }
+      // F over its probability is `total`; so is 1 - F over the other. A forced event keeps 1 - F.
+      V weight = Select(reflects, reflected_weight, transmitted_weight * radiance) * total;
+      weight = Min(IfThenElseZero(accepted, weight), largest);
+      StoreU(exceptions.Output(weight, mirror.weight), d, tile.out[kOutWeight] + lane);
+    }
+
+    V out_x = ox, out_y = oy, mirror_x = mirror.x, mirror_y = mirror.y, out_mx = mx, out_my = my;
+    Turn(d, tile, reflects, out_x, out_y);
+    Turn(d, tile, reflects, out_mx, out_my);
+    Turn(d, tile, mirror.reflects, mirror_x, mirror_y);
+    in.Out(out_x, out_y);
+    in.Out(out_mx, out_my);
+    in.Out(mirror_x, mirror_y);
+    StoreU(exceptions.Output(out_x, mirror_x), d, tile.out[kOutOx] + lane);
+    StoreU(exceptions.Output(out_y, mirror_y), d, tile.out[kOutOy] + lane);
+    StoreU(exceptions.Output(oz, mirror.z), d, tile.out[kOutOz] + lane);
+    StoreU(exceptions.Output(out_mx, zero), d, tile.out[kOutMx] + lane);
+    StoreU(exceptions.Output(out_my, zero), d, tile.out[kOutMy] + lane);
+    StoreU(exceptions.Output(mz, one), d, tile.out[kOutMz] + lane);
+    StoreU(exceptions.Output(c, in.z), d, tile.out[kOutIm] + lane);
+    StoreU(exceptions.Output(branch, mirror.branch), d, tile.out[kOutBranch] + lane);
+    const V scale_t = tile.importance ? one : loaded_eta * loaded_eta;
+    const auto transmits = And(accepted, Not(reflects));
+    StoreU(exceptions.Output(Select(transmits, scale_t, one), Select(mirror.reflects, one, scale_t)), d,
+           tile.out[kOutEtaScale] + lane);
+    const V event = exceptions.Output(IfThenElseZero(transmits, one), IfThenElseZero(Not(mirror.reflects), one));
+    const Rebind<int32_t, D> di;
+    const Rebind<uint8_t, D> db;
+    StoreU(DemoteTo(db, ConvertTo(di, event)), db, tile.event + lane);
+    exceptions.Finish(tile, lane, Not(accepted), statistics);
+  }
+
+ private:
+  static HWY_INLINE Mask<D> Forced(D d, const Tile& tile) { return tile.transmits ? Not(NoLanes(d)) : NoLanes(d); }
+  static HWY_INLINE void Turn(D d, const Tile& tile, Mask<D> lanes, V& x, V& y) {
+    if (!tile.retro) return;
+    const V sign = IfThenElseZero(lanes, SignBit(d));
+    x = Xor(x, sign);
+    y = Xor(y, sign);
+  }
+
+  // What a smooth lane does: the same choice at m = n.
+  struct Mirror {
+    V x, y, z, weight, branch;
+    Mask<D> reflects;
+    template <class In>
+    HWY_INLINE Mirror(D d, const In& in, const Tile& tile, V eta, V u) {
+      const V zero = Zero(d), one = Set(d, 1.0f), inverse_eta = one / eta;
+      const auto front = in.z > zero;
+      const Refraction<D> refraction(d, in.z, eta);
+      V reflected = IfThenElseZero(front, refraction.f);
+      const V transmitted = IfThenElseZero(And(front, refraction.g > zero), one - refraction.f);
+      if (tile.transmits) reflected = zero;
+      const V total = reflected + transmitted;
+      reflects = Or(And(Not(Forced(d, tile)), u * total < reflected), transmitted <= zero);
+      x = Select(reflects, Neg(in.x), Neg(in.x) * inverse_eta);
+      y = Select(reflects, Neg(in.y), Neg(in.y) * inverse_eta);
+      z = Select(reflects, in.z, Neg(refraction.g) * inverse_eta);
+      const V radiance = tile.importance ? one : inverse_eta * inverse_eta;
+      weight = total * Select(reflects, one, radiance);
+      branch = IfThenElseZero(total > zero, Select(reflects, reflected, transmitted) / total);
+    }
+  };
+};
+
+// evaluate_scattering and evaluate_transmission.
+template <class D, class S, class Sampler>
+struct ScatterQuery {
+  using V = Vec<D>;
+  using Distribution = typename S::Distribution;
+  QueryInputs<D, S> in;
+
+  HWY_INLINE ScatterQuery(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
+    return in.AllOrdinary(d, tile, lane) && AllFalse(d, Unbent(d, tile, lane));
+  }
+
+  template <bool kFast>
+  HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
+    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, 3e38f);
+    const V loaded_eta = LoadU(d, tile.in[kEta] + lane);
+    Policy<D> policy;
+    if constexpr (!kFast) {
+      policy = in.Classified(d, tile, lane);
+      policy.smooth = And(policy.valid, Or(policy.smooth, Unbent(d, tile, lane)));
+    }
+    const Exceptions<D, kFast> exceptions(d, policy);
+    const Incident<D, S> i = in.Prepared(d, tile, exceptions);
+    const V eta = exceptions.Harmless(loaded_eta, 1.5f), inverse_eta = one / eta;
+    V x = exceptions.Harmless(in.ox, 0.0f), y = exceptions.Harmless(in.oy, 0.0f);
+    const V z = exceptions.Harmless(in.oz, 1.0f);
+    const auto reflects = z > zero;
+    if (tile.retro) {
+      const V sign = IfThenElseZero(reflects, SignBit(d));
+      x = Xor(x, sign);
+      y = Xor(y, sign);
+    }
+
+    // m ~ i + o, or i + eta o turned upwards.
+    const V index = Select(reflects, one, eta);
+    V hx = Fma(index, x, i.x), hy = Fma(index, y, i.y), hz = Fma(index, z, i.z);
+    const auto straight = hz > zero;
+    const V upwards = And(hz, SignBit(d));
+    const V h2 = Dot(hx, hy, hz, hx, hy, hz);
+    hx = Xor(hx, upwards);
+    hy = Xor(hy, upwards);
+    hz = Xor(hz, upwards);
+    const V dot_i = Dot(hx, hy, hz, i.x, i.y, i.z), dot_o = Dot(hx, hy, hz, x, y, z);
+    // A reflection's half vector points up and faces both; o = -i has none.
+    auto reached = Select2(reflects, And(straight, h2 > Set(d, 0x1p-40f)),
+                           And(And(And(z < zero, hz > zero), And(dot_i > zero, dot_o < zero)), h2 > Set(d, 1e-30f)));
+    if (tile.transmits) reached = And(reached, Not(reflects));
+    if (!i.all_front) reached = AndNot(S::Masking::Blind(d, i), reached);
+
+    const V length2 = Select(reached, h2, one);
+    const V inverse_length = one / Sqrt(length2);
+    const V mx = IfThenElseZero(reached, hx * inverse_length), my = IfThenElseZero(reached, hy * inverse_length);
+    const V mz = Select(reached, hz * inverse_length, one);
+    const V c = Min(Select(reached, Select(reflects, Set(d, 0.5f) * length2, dot_i) * inverse_length, one), one);
+    const V om = Abs(dot_o) * inverse_length;
+
+    const Refraction<D> refraction(d, c, eta);
+    // The event that o means is valid; is the other?
+    const V rz = Fms(c + c, mz, i.z), tz = refraction.Direction(i.z, mz, inverse_eta);
+    const V f = refraction.f, rest = one - f;
+    const V reflected = IfThenElseZero(Or(reflects, rz > zero), f);
+    const V transmitted = IfThenElseZero(Or(Not(reflects), And(refraction.g > zero, tz < zero)), rest);
+    V branch = one;
+    if (!tile.transmits) {
+      const V total = reflected + transmitted;
+      branch = IfThenElseZero(total > zero, Select(reflects, reflected, transmitted) / total);
+    }
+    branch = IfThenElseZero(reached, branch);
+
+    const V density = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, one, i.shift));
+    const V denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay);
+    // p(o) over that of a reflection: 4 c eta^2 |o.m| / |i + eta o|^2
+    const V jacobian = Select(reflects, one, four * c * (eta * eta) * om / length2);
+
+    if (tile.wanted & kWantsPdf) {
+      const V two_n = Sampler::TwoN(d, i, mx, my, mz, c);
+      V numerator = density;
+      if constexpr (Distribution::kShifts && !Sampler::kShifted)
+        if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, one, zero));
+      const V pdf = Min(Min(numerator / (denominator * two_n), largest) * jacobian * branch, largest);
+      StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
+    }
+    if (tile.wanted & kWantsValue) {
+      V two_n, w;
+      S::Masking::Value(d, i, mz, c, x, y, z, tile.uncorrelated, two_n, w);
+      const V reflection = Min(density / (denominator * two_n), largest) * IfThenElseZero(reflects, w) * f;
+      const V masking = S::Masking::TransmissionMasking(d, i, mz, c, om, x, y, z);
+      const V radiance = tile.importance ? one : inverse_eta * inverse_eta;
+      const V transmission = Min(density / (denominator * S::Masking::VisibleTwoN(d, i, mz, c)), largest) * jacobian *
+                             (masking * rest * radiance);
+      const V value = Min(IfThenElseZero(reached, Select(reflects, reflection, transmission)), largest);
+      StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
+    }
+    StoreU(exceptions.Output(branch, zero), d, tile.out[kOutBranch] + lane);
+    // A reflection that no microfacet makes is no occluded one, as in pdf_reflection.
+    auto answered = Or(reflects, reached);
+    if (tile.transmits) answered = reached;
+    if (!i.all_front) answered = AndNot(S::Masking::Blind(d, i), answered);
+    exceptions.Finish(tile, lane, Not(answered), statistics);
+  }
+
+ private:
+  static HWY_INLINE Mask<D> Select2(Mask<D> which, Mask<D> yes, Mask<D> no) {
+    return Or(And(which, yes), AndNot(which, no));
+  }
+};
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
+
+#endif
