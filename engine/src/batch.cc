@@ -69,7 +69,8 @@ void make_plan(Operation operation, const Batch& batch, const KernelTable& table
   for (std::size_t k = 0; k < kInputs; ++k) {
     const Column<float>& column = *columns.in[k];
     if (!column.present()) {
-      const bool needed = k == kF90 ? model.interface == Interface::schlick : affine;
+      const bool needed = k == kF90 ? model.interface == Interface::schlick
+                                    : affine || model.distribution == Distribution::table;
       if (const auto otherwise = input_fields()[k].otherwise; otherwise && needed)
         plan.one_value[plan.one_value_count++] = {k, *otherwise};
     } else if (column.one_value()) {
@@ -93,7 +94,7 @@ void make_plan(Operation operation, const Batch& batch, const KernelTable& table
   plan.tile.importance = model.transport == Transport::importance;
   plan.tile.retro = model.retro;
   plan.tile.interface = model.interface;
-  plan.tile.table = model.table.get();
+  plan.tile.table = model.table ? &model.table->view() : nullptr;
 }
 
 // Runs a range of a plan's lanes, tile by tile. Contiguous columns are used where they lie; the others, and the

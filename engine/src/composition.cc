@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "facetwise/slope_table.h"
 #include "facetwise/target.h"
 #include "src/tile.h"
 
@@ -120,6 +121,13 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
                                                                    : "slope_correlation";
     return invalid(field, absl::StrCat(model_name(model), " does not take it; ggx, beckmann and table with smith do"));
   }
+  const bool skewed = model.table != nullptr && !model.table->radial();
+  if (skewed && model.masking == Masking::vcavity)
+    return invalid("model.masking", "vcavity needs a density that is the same on both sides of a groove: a radial table");
+  if (skewed && batch.slope_correlation.present())
+    return invalid("slope_correlation", "correlated roughness needs a radial table");
+  if (skewed && model.retro)
+    return invalid("model.retro", "needs normals that are distributed symmetrically about n: a radial table");
   if (model.retro && (batch.mean_slope_x.present() || batch.mean_slope_y.present()))
     return invalid("model.retro", "needs normals that are distributed symmetrically about n: not with a mean slope");
 

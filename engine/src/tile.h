@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "facetwise/batch.h"
+#include "facetwise/slope_table.h"
 #include "facetwise/target.h"
 
 namespace facetwise {
@@ -59,7 +60,7 @@ struct Tile {
   bool importance = false;         // Transport::importance
   bool retro = false;
   Interface interface = Interface::conductor;
-  const SlopeTable* table = nullptr;
+  const SlopeTableView* table = nullptr;
 };
 
 // Adds the tile's lanes that are not accepted to the statistics.

@@ -35,6 +35,7 @@ struct SlopeTableView {
   const float* side;     // where m leans to, given its tilt: [row][slopes][uniforms + 1]
   std::int32_t grid, areas, incidence, slopes, uniforms;
   std::int32_t azimuths;  // 0 if radial
+  float mean_x, mean_y;   // the density's mean slope, which Smith masking takes as if given with the batch
 };
 
 // Immutable; any number of threads may use one.

@@ -19,6 +19,7 @@ namespace HWY_NAMESPACE {
 struct Beckmann : SlopeDistribution<Beckmann> {
   static constexpr bool kShifts = true;
   static constexpr float kLargestRoughness = kLargestAlpha;
+  static constexpr bool kOwnMean = false;
   static constexpr bool kHasShare = false;
   static constexpr bool kCavityBehind = true;
 
@@ -57,7 +58,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
   }
   // 2 sigma(-o) times e^(shift) of i: both may underflow, their quotient does not.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Areas(D d, const I& i, V z, V a, V& front, V& back, V& scale) {
+  static HWY_INLINE void Areas(D d, const I& i, V, V, V z, V a, V& front, V& back, V& scale) {
     V root, erfcx, tail;
     const V k = Cotangent(d, z, a, root);
     ErfcxAndTail(d, k, erfcx, tail);

@@ -16,6 +16,7 @@ namespace HWY_NAMESPACE {
 
 struct Ggx {
   static constexpr bool kShifts = false;
+  static constexpr bool kOwnMean = false;
   static constexpr bool kHasShare = true;
   static constexpr bool kCavityBehind = true;
   static constexpr float kLargestRoughness = kLargestAlpha;
@@ -33,7 +34,7 @@ struct Ggx {
 
   // For a direction o in front of the surface, its z' and A: 2 sigma(o), and 2 sigma(-o) as back / scale.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Areas(D, const I&, V z, V a, V& front, V& back, V& scale) {
+  static HWY_INLINE void Areas(D, const I&, V, V, V z, V a, V& front, V& back, V& scale) {
     front = z + Sqrt(Fma(z, z, a));
     back = a;
     scale = front;

@@ -147,6 +147,10 @@ struct Inputs {
       rotation = PrincipalAxes(d, correlation, ax, ay);
       rotation.In(x, y);
       rotation.In(mean_x, mean_y);
+      if constexpr (S::Distribution::kOwnMean) {
+        mean_x = Fma(ax, Set(d, tile.table->mean_x), mean_x);
+        mean_y = Fma(ay, Set(d, tile.table->mean_y), mean_y);
+      }
     }
   }
 

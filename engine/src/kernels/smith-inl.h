@@ -44,7 +44,7 @@ struct Smith {
     if constexpr (I::Surface::kAffine) oz = NegFma(i.mean_x, ox, NegFma(i.mean_y, oy, oz));
     const V z = Max(oz, Set(d, 0x1p-60f));
     V front, back, scale;
-    Distribution::Areas(d, i, z, a, front, back, scale);
+    Distribution::Areas(d, i, wx, wy, z, a, front, back, scale);
     if (uncorrelated) {
       numerator = z + z;
       denominator = front;

@@ -18,6 +18,7 @@ namespace HWY_NAMESPACE {
 
 struct StudentT : SlopeDistribution<StudentT> {
   static constexpr bool kShifts = false;
+  static constexpr bool kOwnMean = false;
   static constexpr bool kHasShare = false;
   static constexpr bool kCavityBehind = false;
   static constexpr float kLargestRoughness = kLargestAlpha;
@@ -44,7 +45,7 @@ struct StudentT : SlopeDistribution<StudentT> {
   }
   // nu - z is 2 A / (nu + z).
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Areas(D d, const I&, V z, V a, V& front, V& back, V& scale) {
+  static HWY_INLINE void Areas(D d, const I&, V, V, V z, V a, V& front, V& back, V& scale) {
     V nu;
     const V sum = Sum(d, z, a, nu), a2 = a + a;
     back = a2 * a2;

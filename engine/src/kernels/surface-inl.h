@@ -58,7 +58,7 @@ struct Incident {
   Mask<D> front;  // i_z > 0
   Mask<D> ahead;  // w_z > 0
   bool all_front;  // both, in all lanes
-  const SlopeTable* table;
+  const SlopeTableView* table;
 };
 
 template <class S, class D, class V = Vec<D>>
@@ -132,9 +132,9 @@ struct Rotation {
   }
 };
 
-// To the principal axes of [[ax^2, rho ax ay], [rho ax ay, ay^2]]: ax and ay become the roots of its eigenvalues. With
-// half difference g, covariance c and R = |(g, c)|, the larger eigenvalue is mean + R and its axis is half the
-// angle of (g, c) away.
+// To the principal axes of [[ax^2, rho ax ay], [rho ax ay, ay^2]], each to the nearer one: ax and ay become the roots of the
+// eigenvalues there. With half difference g, covariance c and R = |(g, c)| the eigenvalues are mean +- R, and the axes are half the
+// angle of (|g|, c) away.
 template <class D, class V = Vec<D>>
 HWY_INLINE Rotation<D> PrincipalAxes(D d, V rho, V& ax, V& ay) {
   const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
@@ -144,18 +144,18 @@ HWY_INLINE Rotation<D> PrincipalAxes(D d, V rho, V& ax, V& ay) {
   const V big_r = Sqrt(Fma(g, g, c * c));
   const auto round = big_r <= zero;
   const V safe_r = Select(round, one, big_r);
-  const V larger = Sqrt(half * ((big_r + Abs(g)) / safe_r));   // of cos, sin: in [sqrt(1/2), 1]
-  const V smaller = half * (c / (safe_r * larger));             // with c's sign
-  const auto x_is_larger = g >= zero;
-  const V sign = And(c, SignBit(d));
-  r.cos = Select(round, one, Select(x_is_larger, larger, Abs(smaller)));
-  r.sin = IfThenElseZero(Not(round), Select(x_is_larger, smaller, Xor(larger, sign)));
-  const V mean = half * Fma(ax, ax, ay * ay);
-  const V major = Sqrt(mean + big_r);
+  const V cos = Sqrt(half * ((big_r + Abs(g)) / safe_r));  // in [sqrt(1/2), 1]
+  const V sin = half * (c / (safe_r * cos));
+  const auto x_is_major = g >= zero;
+  r.cos = Select(round, one, cos);
+  r.sin = IfThenElseZero(Not(round), Select(x_is_major, sin, Neg(sin)));
+  const V major = Sqrt(Fma(half, Fma(ax, ax, ay * ay), big_r));
   // The product of the roots is ax ay sqrt(1 - rho^2).
   const V minor = ax * ay * Sqrt((one - rho) * (one + rho)) / major;
-  ax = Select(round, ax, major);
-  ay = Select(round, ay, minor);
+  const auto uncorrelated = c == zero;
+  const V first = Select(x_is_major, major, minor), second = Select(x_is_major, minor, major);
+  ax = Select(uncorrelated, ax, first);
+  ay = Select(uncorrelated, ay, second);
   return r;
 }
 

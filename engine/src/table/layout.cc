@@ -36,6 +36,29 @@ absl::Status check_sizes(const TableSizes& sizes) {
   return absl::OkStatus();
 }
 
+namespace {
+
+// The mean slope, cell by cell of the grid. By w: slope = 2 w / (1 - w^2), m_z dm = 4 (1 - w^2) / (1 + w^2)^3 dw, whose product
+// is finite at the rim.
+void set_mean(SlopeTableView& view) {
+  if (view.azimuths == 0) return;
+  double sum_x = 0, sum_y = 0, sum = 0;
+  const int n = view.grid;
+  for (int row = 0; row < n; ++row)
+    for (int column = 0; column < n; ++column) {
+      const double wx = 2.0 * column / (n - 1) - 1, wy = 2.0 * row / (n - 1) - 1, squared = wx * wx + wy * wy;
+      if (squared >= 1) continue;
+      const double t = 1 / (1 + squared), density = double{view.density[row * n + column]} * t * t * t;
+      sum += density * (1 - squared);
+      sum_x += density * 2 * wx;
+      sum_y += density * 2 * wy;
+    }
+  view.mean_x = static_cast<float>(sum_x / sum);
+  view.mean_y = static_cast<float>(sum_y / sum);
+}
+
+}  // namespace
+
 std::shared_ptr<const SlopeTable> SlopeTableMaker::make(const TableSizes& sizes, std::vector<float> values) {
   std::shared_ptr<SlopeTable> table(new SlopeTable);
   table->values_ = std::move(values);
@@ -51,6 +74,7 @@ std::shared_ptr<const SlopeTable> SlopeTableMaker::make(const TableSizes& sizes,
   view.slopes = static_cast<std::int32_t>(sizes.slopes);
   view.uniforms = static_cast<std::int32_t>(sizes.uniforms);
   view.azimuths = static_cast<std::int32_t>(sizes.azimuths);
+  set_mean(view);
   table->id_ = fnv1a(table->values_.data(), table->bytes(), fnv1a(&sizes, sizeof sizes));
   table->description_ = sizes.azimuths == 0
                             ? absl::StrCat("radial, grid ", sizes.grid)

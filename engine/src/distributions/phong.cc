@@ -1,0 +1,29 @@
+// Phong's kernels.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/distributions/phong.cc"
+#include "hwy/foreach_target.h"  // IWYU pragma: keep
+
+#include "hwy/highway.h"
+#include "src/kernels/register-inl.h"
+#include "src/kernels/phong-inl.h"
+#include "src/kernels/vcavity-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+template <class D, class>
+constexpr DistributionKernels MakePhong() {
+  DistributionKernels kernels;
+  kernels.vcavity = Registrar<Surface<Phong, VCavity, false>, D>()
+                        .template Add<SlopeNdf>(Sampler::ndf)
+                        .template Add<CavityVisible>(Sampler::visible)
+                        .kernels;
+  return kernels;
+}
+
+FACETWISE_REGISTER(Phong)
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();

@@ -1,0 +1,35 @@
+// Tabulated's kernels.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "src/distributions/table.cc"
+#include "hwy/foreach_target.h"  // IWYU pragma: keep
+
+#include "hwy/highway.h"
+#include "src/kernels/register-inl.h"
+#include "src/kernels/table-inl.h"
+#include "src/kernels/vcavity-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace facetwise {
+namespace HWY_NAMESPACE {
+
+template <class D, class>
+constexpr DistributionKernels MakeTabulated() {
+  DistributionKernels kernels;
+  // A table has a mean slope of its own.
+  kernels.smith_affine = Registrar<Surface<Tabulated, Smith, true>, D>()
+                             .template Add<TableNdf>(Sampler::ndf)
+                             .template Add<TableVisible>(Sampler::visible)
+                             .kernels;
+  kernels.smith = kernels.smith_affine;
+  kernels.vcavity = Registrar<Surface<Tabulated, VCavity, false>, D>()
+                        .template Add<TableNdf>(Sampler::ndf)
+                        .template Add<TableCavity>(Sampler::visible)
+                        .kernels;
+  return kernels;
+}
+
+FACETWISE_REGISTER(Tabulated)
+
+}  // namespace HWY_NAMESPACE
+}  // namespace facetwise
+HWY_AFTER_NAMESPACE();
