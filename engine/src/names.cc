@@ -107,7 +107,7 @@ std::span<const Operation> all_operations() {
 bool samples_normals(Sampler sampler) { return sampler != Sampler::bounded && sampler != Sampler::exact; }
 
 bool uses_u3(const Model& model, Sampler sampler) {
-  if (sampler == Sampler::exact) return true;
+  if (sampler == Sampler::exact) return model.distribution != Distribution::beckmann || model.masking != Masking::smith;
   if (sampler != Sampler::visible) return false;
   return model.masking == Masking::vcavity;
 }

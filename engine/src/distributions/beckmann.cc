@@ -5,7 +5,7 @@
 
 #include "hwy/highway.h"
 #include "src/kernels/register-inl.h"
-#include "src/kernels/beckmann-inl.h"
+#include "src/kernels/beckmann_exact-inl.h"
 #include "src/kernels/vcavity-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -18,6 +18,7 @@ constexpr DistributionKernels MakeBeckmann() {
   kernels.smith = Registrar<Surface<Beckmann, Smith, false>, D>()
                       .template Add<SlopeNdf>(Sampler::ndf)
                       .template Add<SlopeVisible>(Sampler::visible)
+                      .template Add<BeckmannExact>(Sampler::exact)
                       .kernels;
   kernels.smith_affine = Registrar<Surface<Beckmann, Smith, true>, D>()
                              .template Add<SlopeNdf>(Sampler::ndf)

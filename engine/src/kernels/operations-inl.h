@@ -400,8 +400,14 @@ struct Query {
     const V largest = Set(d, 3e38f);  // a density can be beyond the floats straight below a smooth surface
 
     if (tile.wanted & kWantsPdf) {
-      const V two_n = Sampler::TwoN(d, i, mx, my, mz, im);
-      V numerator = density;
+      V numerator = density, two_n;
+      if constexpr (HasOwnShift<Sampler>) {
+        V shift;
+        two_n = Sampler::TwoN(d, i, mx, my, mz, im, shift);
+        numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, shift));
+      } else {
+        two_n = Sampler::TwoN(d, i, mx, my, mz, im);
+      }
       if constexpr (Distribution::kShifts && !Sampler::kShifted)
         if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, zero));
       const V pdf = Min(numerator / (denominator * two_n), largest);

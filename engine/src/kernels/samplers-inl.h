@@ -7,6 +7,7 @@
 //   kUsesU3     u3 is read
 //   kNIsSigma   N = sigma(i)
 //   kShifted    N is times exp(shift), as sigma is (surface-inl.h)
+//   kOwnShift   N is times e^(shift) of the sample's own
 //   kExact      for i_z > 0 no reflection is occluded; o_z is raised to kRim
 //   kNormals    serves normals and transmission too, not reflections alone
 
@@ -47,6 +48,7 @@ struct Drawn {
   V im;          // i . M = w . m_hat
   V two_n;       // 2 N
   V sx, sy;      // standard slopes, of the samplers that draw them
+  V shift;       // 2 N is times e^(shift), of samplers with kOwnShift
 };
 
 // Fills in M and M.M from m_hat.

@@ -13,6 +13,9 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
+template <class Sampler>
+inline constexpr bool HasOwnShift = requires { Sampler::kOwnShift; };
+
 struct Smith {
   static constexpr bool kUnboundedW = false;  // of Value()
 
@@ -74,6 +77,7 @@ struct Smith {
       all = all * i.tn;
       if constexpr (I::Distribution::kShifts && !Sampler::kShifted)
         if (!i.all_front) lit = lit * Exp(d, i.shift);
+      if constexpr (HasOwnShift<Sampler>) lit = lit * Exp(d, Neg(drawn.shift));
     }
     return lit / all;
   }
