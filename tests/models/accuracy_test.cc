@@ -1,9 +1,9 @@
 // Densities, values and projected areas of every composition against the double-precision reference.
 //
-// Errors are relative, in units of 2^-24. The reference is evaluated at the kernels' own float inputs. What is left is
-// rounding inside the kernel, which the answer's conditioning magnifies: an error above `floor` may be at most `factor` times
-// what the reference itself changes by when each of its inputs is moved by one unit of the larger of itself and the vector
-// it belongs to (i + o rounds to that).
+// Errors are relative, in units of 2^-24. The reference is evaluated at the kernels' own float inputs. What
+// is left is rounding inside the kernel, which the answer's conditioning magnifies: an error above `floor`
+// may be at most `factor` times what the reference itself changes by when each of its inputs is moved by one
+// unit of the larger of itself and the vector it belongs to (i + o rounds to that).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,15 +20,34 @@ using reference::Surface;
 using reference::Vector;
 
 constexpr double kUnit = 0x1p-24;
-// Below this, parts of an answer leave the floats' normal range, and its digits are lost: Student-t has sixth powers.
-double smallest(const Composition& c) { return c.model.distribution == Distribution::student_t ? 1e-15 : 1e-24; }
+// Below this, parts of an answer leave the floats' normal range, and its digits are lost: Student-t has sixth
+// powers.
+double smallest(const Composition& c) {
+  return c.model.distribution == Distribution::student_t ? 1e-15 : 1e-24;
+}
 
 constexpr double kFloor = 64, kFactor = 4;
 
 using Truth = double (*)(const Composition&, const double (&)[kPointFloats]);
 
 // The members of Point as doubles, so that they can be moved by less than a float's spacing.
-enum Slot { kIx, kIy, kIz, kAlphaX, kAlphaY, kMeanX, kMeanY, kCorrelation, kEta, kF0, kF90, kOx, kOy, kOz, kSlots };
+enum Slot {
+  kIx,
+  kIy,
+  kIz,
+  kAlphaX,
+  kAlphaY,
+  kMeanX,
+  kMeanY,
+  kCorrelation,
+  kEta,
+  kF0,
+  kF90,
+  kOx,
+  kOy,
+  kOz,
+  kSlots
+};
 
 Surface surface_at(const Composition& c, const double (&v)[kPointFloats]) {
   Surface s = surface_of(c, Point{});
@@ -96,8 +115,8 @@ void compare(Row& row, const char* what, Truth truth, const Composition& c, cons
   row.worst_ratio = std::max(row.worst_ratio, ratio);
   if (ratio <= factor) return;
   if (++row.unexplained <= 3)
-    ADD_FAILURE() << what << " is " << got << ", not " << expected << ": off by " << error << " units, the inputs' rounding is "
-                  << moves << ": " << describe(c) << describe(point);
+    ADD_FAILURE() << what << " is " << got << ", not " << expected << ": off by " << error
+                  << " units, the inputs' rounding is " << moves << ": " << describe(c) << describe(point);
 }
 
 void finish(const Family& family, const char* what, Row& row) {
@@ -108,8 +127,10 @@ void finish(const Family& family, const char* what, Row& row) {
     return *place;
   };
   const double median = at(0.5);
-  std::printf("%-22s %-16s %8zu lanes: median %.2f, 99 %% %.1f units of 2^-24; beyond the floor at most %.2f of rounding\n",
-              name(family).c_str(), what, row.errors.size(), median, at(0.99), row.worst_ratio);
+  std::printf(
+      "%-22s %-16s %8zu lanes: median %.2f, 99 %% %.1f units of 2^-24; beyond the floor at most %.2f of "
+      "rounding\n",
+      name(family).c_str(), what, row.errors.size(), median, at(0.99), row.worst_ratio);
   EXPECT_LE(median, 8) << what;
   EXPECT_EQ(row.unexplained, 0u) << what;
 }
@@ -122,14 +143,15 @@ TEST_P(ModelAccuracy, DensitiesOfReflections) {
   Row row;
   std::uint64_t seed = 1;
   for (const Composition& c : compositions(GetParam(), Operation::pdf_reflection)) {
-    if (c.model.interface != Interface::conductor || c.model.shadowing != Shadowing::correlated) continue;
+    if (c.model.shadowing != Shadowing::correlated) continue;
     const std::vector<Point> points = hard_points(c, 4 * points_each(), ++seed);
     const std::vector<Result> results = run_points(Operation::pdf_reflection, c, points);
-    const Truth truth = [](const Composition& c, const double (&v)[kPointFloats]) {
+    const Truth truth = [](const Composition& c, const double(&v)[kPointFloats]) {
       if (v[kIz] <= 0 && !sees_behind(c.model)) return 0.0;
       return reference::pdf_reflection(surface_at(c, v), c.sampler, i_at(v), o_at(v));
     };
-    for (std::size_t n = 0; n < points.size(); ++n) compare(row, "pdf", truth, c, points[n], results[n].pdf, kFloor, kFactor);
+    for (std::size_t n = 0; n < points.size(); ++n)
+      compare(row, "pdf", truth, c, points[n], results[n].pdf, kFloor, kFactor);
   }
   finish(GetParam(), "pdf", row);
 }
@@ -137,14 +159,15 @@ TEST_P(ModelAccuracy, DensitiesOfReflections) {
 TEST_P(ModelAccuracy, Values) {
   Row row;
   std::uint64_t seed = 1000;
-  for (const Composition& c : compositions(GetParam(), Operation::pdf_reflection)) {
+  for (const Composition& c : compositions(GetParam(), Operation::evaluate_and_pdf)) {
     if (c.sampler != Sampler::visible) continue;  // values know no sampler
     const std::vector<Point> points = hard_points(c, 2 * points_each(), ++seed);
     const std::vector<Result> results = run_points(Operation::evaluate_reflection, c, points);
-    const Truth truth = [](const Composition& c, const double (&v)[kPointFloats]) {
+    const Truth truth = [](const Composition& c, const double(&v)[kPointFloats]) {
       return reference::evaluate_reflection(surface_at(c, v), i_at(v), o_at(v));
     };
-    for (std::size_t n = 0; n < points.size(); ++n) compare(row, "value", truth, c, points[n], results[n].value, kFloor, kFactor);
+    for (std::size_t n = 0; n < points.size(); ++n)
+      compare(row, "value", truth, c, points[n], results[n].value, kFloor, kFactor);
   }
   finish(GetParam(), "value", row);
 }
@@ -154,19 +177,20 @@ TEST_P(ModelAccuracy, AreaAndMasking) {
   const Composition c = plain(GetParam(), Sampler::visible);
   const std::vector<Point> points = hard_points(c, 16 * points_each(), 7);
   const std::vector<Result> results = run_points(Operation::masking, c, points);
-  const Truth area = [](const Composition& c, const double (&v)[kPointFloats]) {
+  const Truth area = [](const Composition& c, const double(&v)[kPointFloats]) {
     return v[kIz] <= 0 && !sees_behind(c.model) ? 0.0 : reference::normaliser(surface_at(c, v), i_at(v));
   };
-  const Truth masking = [](const Composition& c, const double (&v)[kPointFloats]) {
+  const Truth masking = [](const Composition& c, const double(&v)[kPointFloats]) {
     return reference::masking(surface_at(c, v), i_at(v));
   };
   for (std::size_t n = 0; n < points.size(); ++n) {
     compare(areas, "projected area", area, c, points[n], results[n].area, kFloor, kFactor);
     // V-cavity masking is of a normal, and has no output.
-    if (c.model.masking == Masking::vcavity)
+    if (c.model.masking == Masking::vcavity) {
       EXPECT_EQ(results[n].masking, 0);
-    else
+    } else {
       compare(maskings, "masking", masking, c, points[n], results[n].masking, kFloor, kFactor);
+    }
   }
   finish(GetParam(), "projected area", areas);
   finish(GetParam(), "masking", maskings);

@@ -22,6 +22,10 @@ bool samples(Operation operation) {
   return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
          operation == Operation::sample_transmission || operation == Operation::sample_scattering;
 }
+bool reads_interface(Operation operation) {
+  return operation != Operation::sample_normal && operation != Operation::pdf_reflection &&
+         operation != Operation::masking;
+}
 bool queries(Operation operation) { return !samples(operation) && operation != Operation::masking; }
 
 float largest_alpha(Distribution distribution) {
@@ -31,15 +35,16 @@ float largest_alpha(Distribution distribution) {
 }  // namespace
 
 std::string name(const Family& family) {
-  return std::string(facetwise::name(family.distribution)) + "_" + std::string(facetwise::name(family.masking)) +
-         (family.affine ? "_affine" : "");
+  return std::string(facetwise::name(family.distribution)) + "_" +
+         std::string(facetwise::name(family.masking)) + (family.affine ? "_affine" : "");
 }
 void PrintTo(const Family& family, std::ostream* to) { *to << name(family); }
 
 std::string describe(const Composition& c) {
   std::string text;
-  for (const std::string_view part : {name(c.model.distribution), name(c.model.masking), name(c.sampler),
-                                      name(c.model.shadowing), name(c.model.normalisation), name(c.model.interface)})
+  for (const std::string_view part :
+       {name(c.model.distribution), name(c.model.masking), name(c.sampler), name(c.model.shadowing),
+        name(c.model.normalisation), name(c.model.interface)})
     text.append(part).append(" ");
   if (c.model.transport == Transport::importance) text += "importance ";
   if (c.model.retro) text += "retro ";
@@ -49,11 +54,12 @@ std::string describe(const Composition& c) {
 
 std::string describe(const Point& p) {
   char buffer[500];
-  std::snprintf(buffer, sizeof buffer,
-                "i (%.9g, %.9g, %.9g) alpha %.9g %.9g mean (%.9g, %.9g) correlation %.9g eta %.9g f0 %.9g f90 %.9g "
-                "o (%.9g, %.9g, %.9g) u %.9g %.9g %.9g",
-                p.ix, p.iy, p.iz, p.alpha_x, p.alpha_y, p.mean_x, p.mean_y, p.correlation, p.eta, p.f0, p.f90, p.ox,
-                p.oy, p.oz, p.u1, p.u2, p.u3);
+  std::snprintf(
+      buffer, sizeof buffer,
+      "i (%.9g, %.9g, %.9g) alpha %.9g %.9g mean (%.9g, %.9g) correlation %.9g eta %.9g f0 %.9g f90 %.9g "
+      "o (%.9g, %.9g, %.9g) u %.9g %.9g %.9g",
+      p.ix, p.iy, p.iz, p.alpha_x, p.alpha_y, p.mean_x, p.mean_y, p.correlation, p.eta, p.f0, p.f90, p.ox,
+      p.oy, p.oz, p.u1, p.u2, p.u3);
   return buffer;
 }
 
@@ -107,6 +113,7 @@ std::vector<Composition> compositions(const Family& family, Operation operation)
         for (const Interface interface : {Interface::conductor, Interface::schlick, Interface::dielectric})
           for (const bool retro : {false, true}) {
             if (transmits(operation) && interface != Interface::dielectric) continue;
+            if (!reads_interface(operation) && interface != Interface::conductor) continue;
             Composition c = plain(family, sampler);
             c.model.shadowing = shadowing;
             c.model.normalisation = normalisation;
@@ -117,7 +124,8 @@ std::vector<Composition> compositions(const Family& family, Operation operation)
   return all;
 }
 
-Batch make_batch(Operation operation, const Composition& c, std::span<const Point> points, std::span<Result> results) {
+Batch make_batch(Operation operation, const Composition& c, std::span<const Point> points,
+                 std::span<Result> results) {
   const auto in = [&](float Point::*member) {
     return Column<float>(&(points.data()->*member), points.size(), sizeof(Point));
   };
@@ -127,7 +135,7 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
   Batch b;
   b.model = c.model;
   b.sampler = c.sampler;
-  b.lanes = points.size();
+  b.lanes = results.size();
   b.incident = {in(&Point::ix), in(&Point::iy), in(&Point::iz)};
   b.alpha_x = in(&Point::alpha_x);
   b.alpha_y = in(&Point::alpha_y);
@@ -139,8 +147,7 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
     }
     b.slope_correlation = in(&Point::correlation);
   }
-  const bool fresnel = operation != Operation::sample_normal && operation != Operation::pdf_reflection &&
-                       operation != Operation::masking;
+  const bool fresnel = reads_interface(operation);
   if (fresnel && c.model.interface == Interface::dielectric) b.eta = in(&Point::eta);
   if (fresnel && c.model.interface == Interface::schlick) {
     b.f0 = in(&Point::f0);
@@ -174,8 +181,8 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
   return b;
 }
 
-std::vector<Result> run_points(Operation operation, const Composition& composition, std::span<const Point> points,
-                               const Execution& execution) {
+std::vector<Result> run_points(Operation operation, const Composition& composition,
+                               std::span<const Point> points, const Execution& execution) {
   std::vector<Result> results(points.size());
   const auto statistics = run(operation, make_batch(operation, composition, points, results), execution);
   EXPECT_TRUE(statistics.ok()) << describe(composition) << statistics.status();
@@ -215,7 +222,9 @@ Vector direction(double theta, double azimuth) {
   const double t = theta * std::numbers::pi / 180, a = azimuth * std::numbers::pi / 180;
   return {std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)};
 }
-bool accepted(const Result& result) { return result.status == static_cast<std::uint8_t>(LaneStatus::accepted); }
+bool accepted(const Result& result) {
+  return result.status == static_cast<std::uint8_t>(LaneStatus::accepted);
+}
 
 double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Vector unit(Vector a) {
@@ -254,12 +263,24 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
     Point& p = points[n];
     double z = 0;
     switch (n % 8) {
-      case 0: z = 1; break;
-      case 1: z = std::pow(10, -8 * uniform(random)); break;
-      case 2: z = -std::pow(10, -8 * uniform(random)); break;
-      case 3: z = -1 + 1e-3 * uniform(random); break;
-      case 4: z = -uniform(random); break;
-      default: z = uniform(random); break;
+      case 0:
+        z = 1;
+        break;
+      case 1:
+        z = std::pow(10, -8 * uniform(random));
+        break;
+      case 2:
+        z = -std::pow(10, -8 * uniform(random));
+        break;
+      case 3:
+        z = -1 + 1e-3 * uniform(random);
+        break;
+      case 4:
+        z = -uniform(random);
+        break;
+      default:
+        z = uniform(random);
+        break;
     }
     const double azimuth = 2 * std::numbers::pi * uniform(random), r = std::sqrt((1 - z) * (1 + z));
     set_incident(p, unit({r * std::cos(azimuth), r * std::sin(azimuth), z}));
@@ -278,7 +299,8 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
         p.mean_x = static_cast<float>(scale * std::cos(at));
         p.mean_y = static_cast<float>(scale * std::sin(at));
       }
-      if (random() % 4 != 0) p.correlation = static_cast<float>((extreme ? 0.999 : 0.9) * (2 * uniform(random) - 1));
+      if (random() % 4 != 0)
+        p.correlation = static_cast<float>((extreme ? 0.999 : 0.9) * (2 * uniform(random) - 1));
       if (extreme && random() % 8 == 0) p.correlation = std::copysign(0.999f, p.correlation);
       if (extreme && random() % 8 == 0) p.mean_x = std::copysign(100.0f, p.mean_x), p.mean_y = 0;
     }
@@ -300,7 +322,9 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
         z = random() % 2 ? uniform(random) : std::pow(10, -6 * uniform(random));
         o = {std::sqrt((1 - z) * (1 + z)), 0, z};
         break;
-      case 1: o = {-i.x, -i.y, std::abs(i.z)}; break;
+      case 1:
+        o = {-i.x, -i.y, std::abs(i.z)};
+        break;
       default: {
         // A normal of the distribution, roughly, that i sees if one of some does.
         const reference::Surface s = surface_of(c, p);
@@ -325,8 +349,8 @@ std::vector<Point> calm_points(const Composition& c) {
   };
   constexpr Calm kCalm[] = {
       {0, 0, 0.5f, 0.5f, 0, 0, 0},           {40, 25, 0.6f, 0.25f, 0.3f, -0.2f, 0.5f},
-      {70, 200, 0.3f, 0.9f, -0.4f, 0.3f, 0},  {85, 100, 0.4f, 0.4f, 0, 0.2f, -0.7f},
-      {97, 20, 0.5f, 0.3f, 0.2f, 0, 0.4f},    {130, 300, 0.9f, 0.7f, 0, 0, -0.5f},
+      {70, 200, 0.3f, 0.9f, -0.4f, 0.3f, 0}, {85, 100, 0.4f, 0.4f, 0, 0.2f, -0.7f},
+      {97, 20, 0.5f, 0.3f, 0.2f, 0, 0.4f},   {130, 300, 0.9f, 0.7f, 0, 0, -0.5f},
   };
   std::vector<Point> points;
   for (const Calm& calm : kCalm) {
@@ -343,6 +367,12 @@ std::vector<Point> calm_points(const Composition& c) {
   return points;
 }
 
+bool student_t_straight_up(const Composition& c, const Point& p) {
+  return c.model.distribution == Distribution::student_t && c.model.masking == Masking::smith &&
+         c.sampler == Sampler::visible &&
+         std::hypot(p.alpha_x * p.ix, p.alpha_y * p.iy) < 1e-3f * std::abs(p.iz);
+}
+
 std::vector<Point> with_random(const Point& point, std::size_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<Point> points(count, point);
@@ -354,56 +384,98 @@ std::vector<Point> with_random(const Point& point, std::size_t count, std::uint6
   return points;
 }
 
-namespace {
+std::vector<Result> draw(Operation operation, const Composition& c, const Point& point, std::size_t count,
+                         std::uint64_t seed, Statistics* statistics) {
+  std::vector<Result> results(count);
+  Batch batch = make_batch(operation, c, {&point, 1}, results);
+  batch.u1 = batch.u2 = batch.u3 = {};
+  batch.generator = Generator{.seed = seed};
+  const auto ran = run(operation, batch, {.single_thread = true});
+  EXPECT_TRUE(ran.ok()) << describe(c) << ran.status();
+  if (statistics && ran.ok()) *statistics = *ran;
+  return results;
+}
 
-Integral over_grid(Operation operation, const Composition& c, const Point& point, int side) {
+Grid make_grid(Operation operation, const Composition& c, const Point& point, int side) {
   const reference::Surface s = surface_of(c, point);
-  const bool scattering = operation == Operation::evaluate_scattering || operation == Operation::evaluate_transmission;
+  const bool reflects = operation != Operation::evaluate_transmission;
+  const bool scatters = operation == Operation::evaluate_scattering || !reflects;
   // Of the microfacets that reflect: i turned for retro.
   const Vector i = incident(point), from = c.model.retro ? turned(i) : i;
+  Grid grid{.side = side, .pdf = {}, .value = {}};
+  struct Place {
+    int event, cell;
+    double area;
+  };
   std::vector<Point> points;
-  std::vector<double> areas;
-  const auto add = [&](Vector o, double area) {
+  std::vector<Place> places;
+  const auto add = [&](int event, int cell, Vector o, double area) {
     if (!(area > 0)) return;
     points.push_back(point);
     set_outgoing(points.back(), o);
-    areas.push_back(area);
+    places.push_back({event, cell, area});
   };
+  std::minstd_rand random(side);
+  const auto jitter = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
   for (int a = 0; a < side; ++a) {
-    // r = tan(t), and t a quarter circle.
-    const double t = std::numbers::pi / 2 * (a + 0.5) / side, r = std::tan(t), dr = 1 / (std::cos(t) * std::cos(t));
     for (int b = 0; b < side; ++b) {
+      const double t = std::numbers::pi / 2 * (a + jitter()) / side, r = std::tan(t),
+                   dr = 1 / (std::cos(t) * std::cos(t));
       double area = 0;
-      const Vector m = normal_of(s, r, 2 * std::numbers::pi * (b + 0.5) / side, &area);
+      const Vector m = normal_of(s, r, 2 * std::numbers::pi * (b + jitter()) / side, &area);
       area *= r * dr * (std::numbers::pi / 2 / side) * (2 * std::numbers::pi / side);
-      if (const double im = dot(from, m); im > 0 && operation != Operation::evaluate_transmission) {
+      if (const double im = dot(from, m); im > 0 && reflects) {
         const Vector o = reflection(from, m);
-        if (o.z > 0) add(o, area * 4 * im);
+        if (o.z > 0) add(0, a * side + b, o, area * 4 * im);
       }
-      if (const double im = dot(i, m); im > 0 && scattering) {
+      if (const double im = dot(i, m); im > 0 && scatters) {
         Vector o;
         if (!transmission(s.eta, i, m, o) || o.z >= 0) continue;
         const double om = -dot(o, m), sum = im - s.eta * om;
-        add(o, area * sum * sum / (s.eta * s.eta * om));
+        add(1, a * side + b, o, area * sum * sum / (s.eta * s.eta * om));
       }
     }
   }
-  Integral integral;
+  for (int event = 0; event < 2; ++event) {
+    grid.pdf[event].resize(static_cast<std::size_t>(side) * side);
+    grid.value[event].resize(static_cast<std::size_t>(side) * side);
+  }
   const std::vector<Result> results = run_points(operation, c, points);
   for (std::size_t n = 0; n < results.size(); ++n) {
-    integral.pdf += areas[n] * results[n].pdf;
-    integral.value += areas[n] * results[n].value;
+    grid.pdf[places[n].event][places[n].cell] = places[n].area * results[n].pdf;
+    grid.value[places[n].event][places[n].cell] = places[n].area * results[n].value;
   }
-  return integral;
+  return grid;
 }
 
+namespace {
+double sum(const std::vector<double> (&of)[2]) {
+  double total = 0;
+  for (const auto& all : of)
+    for (const double one : all) total += one;
+  return total;
+}
 }  // namespace
+double Grid::total_pdf() const { return sum(pdf); }
+double Grid::total_value() const { return sum(value); }
+
+int cell_of(const Grid& grid, const reference::Surface& s, Vector m) {
+  const double rho = s.slope_correlation, rest = std::sqrt((1 - rho) * (1 + rho));
+  const double x = (-m.x / m.z - s.mean_slope_x) / s.alpha.x;
+  const double y = ((-m.y / m.z - s.mean_slope_y) / s.alpha.y - rho * x) / rest;
+  double phi = std::atan2(y, x) / (2 * std::numbers::pi);
+  if (phi < 0) phi += 1;
+  const double t = std::atan(std::hypot(x, y)) / (std::numbers::pi / 2);
+  const auto part = [&](double at) { return std::clamp(static_cast<int>(at * grid.side), 0, grid.side - 1); };
+  return part(t) * grid.side + part(phi);
+}
 
 Integral integrate(Operation operation, const Composition& c, const Point& point, int side) {
-  Integral fine = over_grid(operation, c, point, side);
-  const Integral coarse = over_grid(operation, c, point, side / 2);
-  fine.error = std::max(std::abs(fine.pdf - coarse.pdf), std::abs(fine.value - coarse.value));
-  return fine;
+  const Grid fine = make_grid(operation, c, point, side), coarse = make_grid(operation, c, point, side / 2);
+  Integral integral{fine.total_pdf(), fine.total_value(), 0};
+  integral.error =
+      std::max(std::abs(integral.pdf - coarse.total_pdf()), std::abs(integral.value - coarse.total_value()));
+  return integral;
 }
 
 }  // namespace facetwise::test

@@ -13,7 +13,8 @@
 
 namespace facetwise::test {
 
-// A distribution with a masking, with or without the columns of mean slope and correlation. Tests are named after it.
+// A distribution with a masking, with or without the columns of mean slope and correlation. Tests are named
+// after it.
 struct Family {
   Distribution distribution = Distribution::ggx;
   Masking masking = Masking::smith;
@@ -34,7 +35,8 @@ std::string describe(const Composition& composition);
 const std::vector<Family>& families();
 // The samplers that an operation takes with a family.
 std::vector<Sampler> samplers_of(const Family& family, Operation operation);
-// Every shadowing, normalisation, interface and retro of a family (retro: see Points), each with every sampler.
+// Every shadowing, normalisation, interface and retro of a family (retro: see Points), each with every
+// sampler.
 std::vector<Composition> compositions(const Family& family, Operation operation);
 // Whether the model shows anything to an i behind the surface: V-cavity with ggx and beckmann, and Smith.
 bool sees_behind(const Model& model);
@@ -60,11 +62,12 @@ struct Result {
   std::uint8_t event = 0, status = 0, unused[2] = {};
 };
 
-// The batch of a call: the columns that it reads, all of its outputs. Points and results are as long as each other.
+// The batch of a call: the columns that it reads, all of its outputs. Points are as many as results, or one.
 Batch make_batch(Operation operation, const Composition& composition, std::span<const Point> points,
                  std::span<Result> results);
 // Runs it; a failure of the test where the call is refused.
-std::vector<Result> run_points(Operation operation, const Composition& composition, std::span<const Point> points,
+std::vector<Result> run_points(Operation operation, const Composition& composition,
+                               std::span<const Point> points,
                                const Execution& execution = {.single_thread = true});
 
 // What the reference calls this lane: the composition with the point's floats.
@@ -83,25 +86,47 @@ reference::Vector turned(reference::Vector i);  // (-i_x, -i_y, i_z)
 // The reflection of i by m; its transmission, false for total reflection. eta = eta_o / eta_i.
 reference::Vector reflection(reference::Vector i, reference::Vector m);
 bool transmission(double eta, reference::Vector i, reference::Vector m, reference::Vector& o);
-// The normal, of unit length, whose standard slopes are (r cos phi, r sin phi); its area per area of standard slopes.
+// The normal, of unit length, whose standard slopes are (r cos phi, r sin phi); its area per area of standard
+// slopes.
 reference::Vector normal_of(const reference::Surface& surface, double r, double phi, double* area = nullptr);
 
-// Ordinary lanes of a family that look for trouble: front, behind, grazing, straight up and nearly straight down; alpha from
-// 1e-3 to the distribution's largest, half of them isotropic; o anywhere, a reflection by a visible normal, the mirror
-// direction, and grazing; u also at 0 and at the largest below 1. Moments are moderate, or with `extreme` up to a mean
-// slope of 100 and a correlation of 0.999. Mean slopes are 0 for a model with retro.
+// Ordinary lanes of a family that look for trouble: front, behind, grazing, straight up and nearly straight
+// down; alpha from 1e-3 to the distribution's largest, half of them isotropic; o anywhere, a reflection by a
+// visible normal, the mirror direction, and grazing; u also at 0 and at the largest below 1. Moments are
+// moderate, or with `extreme` up to a mean slope of 100 and a correlation of 0.999. Mean slopes are 0 for a
+// model with retro.
 std::vector<Point> hard_points(const Composition& composition, std::size_t count, std::uint64_t seed,
                                bool extreme = false);
-// A handful of well-conditioned points for integrals: front, behind, anisotropic; with moments where the family has them.
+// A handful of well-conditioned points for integrals: front, behind, anisotropic; with moments where the
+// family has them.
 std::vector<Point> calm_points(const Composition& composition);
+// Visible normals of Student-t with Smith masking next to straight up, where i.m is known to be wrong:
+// StraightUp tests that.
+bool student_t_straight_up(const Composition& composition, const Point& point);
 // Copies of a point with random u.
 std::vector<Point> with_random(const Point& point, std::size_t count, std::uint64_t seed);
 
-// Integrals of what an operation answers (evaluate_and_pdf or evaluate_scattering) over all o that microfacets reach, by a
-// grid of `side`^2 normals.
+// Samples at one point from the generator.
+std::vector<Result> draw(Operation operation, const Composition& composition, const Point& point,
+                         std::size_t count, std::uint64_t seed, Statistics* statistics = nullptr);
+
+// A grid of side^2 standard slopes: t = atan(r) in [0, pi/2] and the azimuth, both in equal parts. What an
+// operation (evaluate_and_pdf, evaluate_transmission or evaluate_scattering) answers for what a microfacet
+// somewhere in each cell does to i, times the cell's part of the sphere of o. Not in the middle: edges of a
+// density may run along the grid.
+struct Grid {
+  int side = 0;
+  std::vector<double> pdf[2], value[2];  // by Event
+  double total_pdf() const;
+  double total_value() const;
+};
+Grid make_grid(Operation operation, const Composition& composition, const Point& point, int side);
+// The cell of a normal.
+int cell_of(const Grid& grid, const reference::Surface& surface, reference::Vector m);
+
 struct Integral {
   double pdf = 0, value = 0;
-  double error = 0;  // between this grid and one of half the resolution, the larger of the two quantities'
+  double error = 0;  // between this grid and one of half the resolution, the larger of the two
 };
 Integral integrate(Operation operation, const Composition& composition, const Point& point, int side);
 
