@@ -164,6 +164,16 @@ TEST(ModelRefusals, MomentsAreRefusedByTheOthers) {
   }
 }
 
+TEST(ModelRefusals, MaskingsAndTablesFollowTheDistribution) {
+  for (const Operation operation :
+       {Operation::sample_normal, Operation::evaluate_reflection, Operation::masking}) {
+    const std::string message =
+        refused(operation, plain({Distribution::phong, Masking::smith}, Sampler::visible), "model.masking");
+    EXPECT_NE(message.find("vcavity"), std::string::npos) << message;
+    refused(operation, plain({Distribution::table, Masking::smith}, Sampler::visible), "model.table");
+  }
+}
+
 TEST(ModelRefusals, UnknownValuesAreRefused) {
   const Family family = families()[0];
   const auto changed = [&](const std::function<void(Model&)>& change) {

@@ -78,7 +78,8 @@ std::vector<Sampler> samplers_of(const Family& family, Operation operation) {
 const std::vector<Family>& families() {
   static const std::vector<Family> all = [] {
     std::vector<Family> found;
-    for (const Distribution d : {Distribution::ggx, Distribution::beckmann, Distribution::student_t})
+    for (const Distribution d :
+         {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong})
       for (const Masking m : {Masking::smith, Masking::vcavity})
         for (const bool affine : {false, true}) {
           // V-cavity takes no moments: composition_test.cc.
@@ -342,6 +343,26 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
   return points;
 }
 
+std::vector<Point> scattering_points(const Composition& c, std::size_t count, std::uint64_t seed) {
+  std::vector<Point> points = hard_points(c, count, seed);
+  std::mt19937_64 random(~seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (std::size_t n = 0; n < count; ++n) {
+    Point& p = points[n];
+    if (n % 3 == 0) continue;
+    const reference::Surface s = surface_of(c, p);
+    for (int attempt = 0; attempt < 16; ++attempt) {
+      const double v = uniform(random);
+      const Vector m = normal_of(s, std::sqrt(v / (1 - v)), 2 * std::numbers::pi * uniform(random));
+      Vector o;
+      if (dot(incident(p), m) <= 0 || !transmission(p.eta, incident(p), m, o) || o.z >= 0) continue;
+      set_outgoing(p, unit(o));
+      break;
+    }
+  }
+  return points;
+}
+
 std::vector<Point> calm_points(const Composition& c) {
   struct Calm {
     double theta, azimuth;
@@ -371,6 +392,23 @@ bool student_t_straight_up(const Composition& c, const Point& p) {
   return c.model.distribution == Distribution::student_t && c.model.masking == Masking::smith &&
          c.sampler == Sampler::visible &&
          std::hypot(p.alpha_x * p.ix, p.alpha_y * p.iy) < 1e-3f * std::abs(p.iz);
+}
+
+HalfVector half_vector(const Composition& c, const Point& point, Vector i, Vector m) {
+  const bool forms_it = c.model.distribution == Distribution::ggx && c.model.masking == Masking::smith &&
+                        (c.sampler == Sampler::cap || c.sampler == Sampler::visible ||
+                         c.sampler == Sampler::bounded || (c.sampler == Sampler::exact && i.z <= 0));
+  if (!forms_it) return {};
+  const reference::Surface s = surface_of(c, point);
+  const double rho = s.slope_correlation, rest = std::sqrt((1 - rho) * (1 + rho));
+  const double x = (-m.x / m.z - s.mean_slope_x) / s.alpha.x;
+  const double y = ((-m.y / m.z - s.mean_slope_y) / s.alpha.y - rho * x) / rest;
+  const double length = std::sqrt(1 + x * x + y * y) * m.z;
+  const double nu = std::hypot(s.alpha.x * i.x + rho * s.alpha.y * i.y, rest * s.alpha.y * i.y,
+                               i.z - s.mean_slope_x * i.x - s.mean_slope_y * i.y);
+  const double half = 2 * dot(i, m) / (nu * length);
+  return {(1 + std::max(s.alpha.x, s.alpha.y) + std::hypot(s.mean_slope_x, s.mean_slope_y)) * length / half,
+          4 / (half * half)};
 }
 
 std::vector<Point> with_random(const Point& point, std::size_t count, std::uint64_t seed) {

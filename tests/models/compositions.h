@@ -97,12 +97,23 @@ reference::Vector normal_of(const reference::Surface& surface, double r, double 
 // model with retro.
 std::vector<Point> hard_points(const Composition& composition, std::size_t count, std::uint64_t seed,
                                bool extreme = false);
+// The same for dielectrics: two thirds of the o are transmissions, where there are any.
+std::vector<Point> scattering_points(const Composition& composition, std::size_t count, std::uint64_t seed);
 // A handful of well-conditioned points for integrals: front, behind, anisotropic; with moments where the
 // family has them.
 std::vector<Point> calm_points(const Composition& composition);
 // Visible normals of Student-t with Smith masking next to straight up, where i.m is known to be wrong:
 // StraightUp tests that.
 bool student_t_straight_up(const Composition& composition, const Point& point);
+// What is lost where the half vector i_hat + o_hat of standard directions is short, in samplers of ggx that
+// form it: its rounding turns m, and i.m, a product of it with i, loses the square.
+struct HalfVector {
+  double turn = 0;  // units
+  double im = 0;    // units, relative
+};
+HalfVector half_vector(const Composition& composition, const Point& point, reference::Vector i,
+                       reference::Vector m);
+
 // Copies of a point with random u.
 std::vector<Point> with_random(const Point& point, std::size_t count, std::uint64_t seed);
 

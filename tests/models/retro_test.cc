@@ -42,6 +42,8 @@ TEST_P(ModelRetro, IsTheTurnedIncidence) {
                               turned = run_points(Operation::evaluate_and_pdf, without(c), plain);
     std::size_t lit = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {
+      // Straight up, the azimuth that some samplers go by is no turned one.
+      if (points[n].ix == 0 && points[n].iy == 0) continue;
       ASSERT_EQ(retro[n].value, turned[n].value) << describe(c) << describe(points[n]);
       ASSERT_EQ(retro[n].pdf, turned[n].pdf) << describe(c) << describe(points[n]);
       ASSERT_EQ(retro[n].status, turned[n].status) << describe(c) << describe(points[n]);
