@@ -12,19 +12,19 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class>
+template <class D, class Pairs>
 constexpr DistributionKernels MakeBeckmann() {
   DistributionKernels kernels;
-  kernels.smith = Registrar<Surface<Beckmann, Smith, false>, D>()
+  kernels.smith = Registrar<Surface<Beckmann, Smith, false>, D, Pairs>()
                       .template Add<SlopeNdf>(Sampler::ndf)
                       .template Add<SlopeVisible>(Sampler::visible)
                       .template Add<BeckmannExact>(Sampler::exact)
                       .kernels;
-  kernels.smith_affine = Registrar<Surface<Beckmann, Smith, true>, D>()
+  kernels.smith_affine = Registrar<Surface<Beckmann, Smith, true>, D, Pairs>()
                              .template Add<SlopeNdf>(Sampler::ndf)
                              .template Add<SlopeVisible>(Sampler::visible)
                              .kernels;
-  kernels.vcavity = Registrar<Surface<Beckmann, VCavity, false>, D>()
+  kernels.vcavity = Registrar<Surface<Beckmann, VCavity, false>, D, Pairs>()
                         .template Add<SlopeNdf>(Sampler::ndf)
                         .template Add<CavityVisible>(Sampler::visible)
                         .template Add<CavityExact>(Sampler::exact)

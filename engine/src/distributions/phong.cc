@@ -12,10 +12,10 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class>
+template <class D, class Pairs>
 constexpr DistributionKernels MakePhong() {
   DistributionKernels kernels;
-  kernels.vcavity = Registrar<Surface<Phong, VCavity, false>, D>()
+  kernels.vcavity = Registrar<Surface<Phong, VCavity, false>, D, Pairs>()
                         .template Add<SlopeNdf>(Sampler::ndf)
                         .template Add<CavityVisible>(Sampler::visible)
                         .kernels;

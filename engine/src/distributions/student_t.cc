@@ -12,14 +12,14 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class>
+template <class D, class Pairs>
 constexpr DistributionKernels MakeStudentT() {
   DistributionKernels kernels;
-  kernels.smith = Registrar<Surface<StudentT, Smith, false>, D>()
+  kernels.smith = Registrar<Surface<StudentT, Smith, false>, D, Pairs>()
                       .template Add<SlopeNdf>(Sampler::ndf)
                       .template Add<SlopeVisible>(Sampler::visible)
                       .kernels;
-  kernels.vcavity = Registrar<Surface<StudentT, VCavity, false>, D>()
+  kernels.vcavity = Registrar<Surface<StudentT, VCavity, false>, D, Pairs>()
                         .template Add<SlopeNdf>(Sampler::ndf)
                         .template Add<CavityVisible>(Sampler::visible)
                         .template Add<CavityExact>(Sampler::exact)

@@ -19,6 +19,7 @@ namespace HWY_NAMESPACE {
 struct Beckmann : SlopeDistribution<Beckmann> {
   static constexpr bool kShifts = true;
   static constexpr float kLargestRoughness = kLargestAlpha;
+  static constexpr bool kLongChains = true;
   static constexpr bool kOwnMean = false;
   static constexpr bool kHasShare = false;
   static constexpr bool kCavityBehind = true;
@@ -96,7 +97,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     const V one = Set(d, 1.0f);
     const V k = c / Max(s, Set(d, 1e-15f));
     V t;
-    VisibleSlope(d, i, k, u1, x, t);
+    VisibleSlope(d, i.all_front, k, u1, x, t);
     gap = Select(k > one, Max(NegFma(s, x, c), Zero(d)), s * t);
     y = NormalSlope(d, u2, one - u2);
   }
@@ -106,8 +107,9 @@ struct Beckmann : SlopeDistribution<Beckmann> {
   //   (1/2) e^(-X^2) (tail(X) + t erfcx(X)) for x < 0,   k - (1/2) e^(-X^2) (t erfcx(X) - tail(X)) for x > 0,
   // and in all k + (1/2) e^(-k^2) tail(k), for k < 0 (1/2) e^(-k^2) tail(-k), by which e^(-X^2) is then divided
   // before it is formed: k^2 - X^2 = -t (t - 2 k). Of x and t the smaller is kept to all digits: x for k > 1. Three Halley steps; error of the share 1e-6.
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void VisibleSlope(D d, const I& i, V k, V u, V& x, V& t) {
+  // `all_front`: k > 0 in all lanes.
+  template <class D, class V = Vec<D>>
+  static HWY_NOINLINE void VisibleSlope(D d, bool all_front, V k, V u, V& x, V& t) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
     u = Max(u, Set(d, 0x1p-26f));
     const V rest = one - u;
@@ -130,7 +132,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
       inverse_total = one / Fma(half * Gauss(d, abs_k), tail, abs_k);
     }
     // Behind: t^2 = -log u for k = 0, and 2 |k| t - log(1 + 2 |k| t) = -log u for k = -infinity.
-    if (!i.all_front) {
+    if (!all_front) {
       const V l = Neg(Log(d, u));
       const V far = l + Log(d, one + Fma(Set(d, 0.9f), l, Sqrt(l + l)));
       const V weight = abs_k / (abs_k + Set(d, 0.6f));
@@ -166,7 +168,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
   // V-cavity behind, k = |i_z| / sqrt(A): H = (S(k) - S(3 k)) / (2 k) with S(x) = e^(-x^2) tail(x), times e^(k^2). For small k its
   // series, 1 + sum of c_n k^(2 n - 1) (1 - 9^n) / 2, c_n = (-1)^(n + 1) / (sqrt(pi) n! (2 n - 1)).
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void TwoHit(D d, const I& i, V& two_hit, V& shift) {
+  static HWY_NOINLINE void TwoHit(D d, const I& i, V& two_hit, V& shift) {
     V root, erfcx, tail, erfcx3, tail3;
     const V k = Cotangent(d, Abs(i.z), i.a, root);
     ErfcxAndTail(d, k, erfcx, tail);
@@ -183,7 +185,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
   // Tokuyoshi 2021, listings 1, 4 and 5: the first part are slopes below 3 k (k < 0), the second visible ones between 3 k
   // and k.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
+  static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
     const V zero = Zero(d), one = Set(d, 1.0f), two = Set(d, 2.0f), half = Set(d, 0.5f);
     const auto vertical = i.a < Set(d, kSmallestA);
     V root;
@@ -210,7 +212,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     const V at3 = fall * Fma(two * k, erfcx3, tail3) / tail;
     const V u = Fma(u1, one - at3, at3);
     V visible, gap;
-    VisibleSlope(d, i, Neg(k), Min(u, Set(d, 1.0f - 0x1p-24f)), visible, gap);
+    VisibleSlope(d, false, Neg(k), Min(u, Set(d, 1.0f - 0x1p-24f)), visible, gap);
     gap = Min(gap, two * k);
     const V along = Select(first, first_x, Neg(k + gap));
     const V across = NormalSlope(d, u2, one - u2);

@@ -76,7 +76,7 @@ struct NormalInterval {
   V shift;
   V below_to, share;  // e^(shift) times the share below `to`, and between
 
-  HWY_INLINE NormalInterval(D d, V a, V b) {
+  HWY_NOINLINE NormalInterval(D d, V a, V b) {
     const V zero = Zero(d), half = Set(d, 0.5f), one = Set(d, 1.0f);
     const auto turned = a + b > zero;
     flip = IfThenElseZero(turned, SignBit(d));
@@ -93,7 +93,7 @@ struct NormalInterval {
     below_to = Select(tail, half * e_to, one - half * Gauss(d, to) * e_to);
     share = Max(below_to - below_from, zero);
   }
-  HWY_INLINE V Draw(D d, V u) const {
+  HWY_NOINLINE V Draw(D d, V u) const {
     const V one = Set(d, 1.0f);
     // The share below y, of all and of that below `to`.
     const V p = NegFma(one - u, share, below_to);
@@ -150,7 +150,7 @@ struct BeckmannExact {
     const Ellipse<D> ellipse(d, i);
     V x, t, from, to;
     const V u = Fma(u1, ellipse.fb - ellipse.fa, ellipse.fa);
-    Beckmann::VisibleSlope(d, i, ellipse.k, Min(u, Set(d, 1.0f - 0x1p-24f)), x, t);
+    Beckmann::VisibleSlope(d, true, ellipse.k, Min(u, Set(d, 1.0f - 0x1p-24f)), x, t);
     x = Min(Max(x, ellipse.xa), ellipse.xb);
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);

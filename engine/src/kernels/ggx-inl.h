@@ -16,6 +16,7 @@ namespace HWY_NAMESPACE {
 
 struct Ggx {
   static constexpr bool kShifts = false;
+  static constexpr bool kLongChains = false;
   static constexpr bool kOwnMean = false;
   static constexpr bool kHasShare = true;
   static constexpr bool kCavityBehind = true;
@@ -80,7 +81,7 @@ struct Ggx {
   // V-cavity behind. 2 H: with k = |i_z|, r1^2 = A + k^2, r3^2 = A + 9 k^2,
   // H = (r1 - k + r3 - 3 k) / (r1 + r3), the differences by their conjugates.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void TwoHit(D d, const I& i, V& two_hit, V&) {
+  static HWY_NOINLINE void TwoHit(D d, const I& i, V& two_hit, V&) {
     const V a = Max(i.a, Set(d, kSmallestA));
     const V k = Abs(i.z), k3 = Set(d, 3.0f) * k;
     const V r1 = Sqrt(Fma(k, k, a)), r3 = Sqrt(Fma(k3, k3, a));
@@ -91,7 +92,7 @@ struct Ggx {
   // direction with 3 c instead of c; else it is a visible one that does not. Both as in `heitz` (samplers-inl.h) with
   // another s; the second ends at L = -(1 + 2 c^2) / r, r^2 = 1 + 8 c^2.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
+  static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), two = Set(d, 2.0f), three = Set(d, 3.0f);
     const V a = Max(i.a, Set(d, kSmallestA));
     const auto vertical = i.a < Set(d, kSmallestA);

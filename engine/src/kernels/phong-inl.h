@@ -18,6 +18,7 @@ namespace HWY_NAMESPACE {
 struct Phong : SlopeDistribution<Phong> {
   static constexpr bool kShifts = false;
   static constexpr float kLargestRoughness = kLargestPhongAlpha;
+  static constexpr bool kLongChains = true;
   static constexpr bool kOwnMean = false;
   static constexpr bool kCavityBehind = false;
 

@@ -15,7 +15,8 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 // A surface's kernels for vectors D, one sampler after the other. Pairs: the tag for samplers with a long chain, which
-// gain by 15 % from pairs; the others lose up to 9 % by them where registers are few.
+// gain by 15 % from pairs, and for all sampling where the distribution's areas are long; the others lose up to 9 % by them where
+// registers are few.
 template <class S, class D, class Pairs = D>
 struct Registrar {
   SurfaceKernels kernels{};
@@ -26,7 +27,7 @@ struct Registrar {
   template <class Drawer>
   constexpr Registrar& Add(Sampler sampler) {
     const auto index = static_cast<std::size_t>(sampler);
-    using T = std::conditional_t<Drawer::kExact, Pairs, D>;
+    using T = std::conditional_t<Drawer::kExact || S::Distribution::kLongChains, Pairs, D>;
     kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
     kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
     if constexpr (Drawer::kNormals) {

@@ -18,6 +18,7 @@ namespace HWY_NAMESPACE {
 
 struct StudentT : SlopeDistribution<StudentT> {
   static constexpr bool kShifts = false;
+  static constexpr bool kLongChains = true;
   static constexpr bool kOwnMean = false;
   static constexpr bool kHasShare = false;
   static constexpr bool kCavityBehind = false;
@@ -84,7 +85,7 @@ struct StudentT : SlopeDistribution<StudentT> {
   // solved by three Halley steps: error of F 6e-7. They start from the solutions for T = 1 and T = infinity in
   // q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's share is that of a fixed density.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void DrawVisible(D d, const I& i, V, V, V u1, V u2, V& x, V& y, V& gap) {
+  static HWY_NOINLINE void DrawVisible(D d, const I& i, V, V, V u1, V u2, V& x, V& y, V& gap) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f);
     V nu;
     const V sum = Sum(d, i.wz, i.a, nu);

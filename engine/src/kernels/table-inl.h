@@ -22,6 +22,7 @@ namespace HWY_NAMESPACE {
 struct Tabulated {
   static constexpr bool kShifts = false;
   static constexpr float kLargestRoughness = kLargestAlpha;
+  static constexpr bool kLongChains = false;
   static constexpr bool kOwnMean = true;
   static constexpr bool kHasShare = false;
   static constexpr bool kCavityBehind = false;

@@ -104,6 +104,10 @@ HWY_INLINE Pair<V> ShiftLeft(Pair<V> x) {
   return {hn::ShiftLeft<kBits>(x.a), hn::ShiftLeft<kBits>(x.b)};
 }
 using hn::ShiftLeft;
+template <int kBits, class V>
+HWY_INLINE Pair<V> ShiftRight(Pair<V> x) {
+  return {hn::ShiftRight<kBits>(x.a), hn::ShiftRight<kBits>(x.b)};
+}
 using hn::ShiftRight;
 
 // Operations with a tag.
@@ -139,6 +143,10 @@ HWY_INLINE Vec<Twice<D>> BitCast(Twice<D> d, Pair<V> x) {
 template <class D, class V>
 HWY_INLINE Vec<Twice<D>> DemoteTo(Twice<D> d, Pair<V> x) {
   return {DemoteTo(d.d, x.a), DemoteTo(d.d, x.b)};
+}
+template <class D, class V>
+HWY_INLINE Vec<Twice<D>> ConvertTo(Twice<D> d, Pair<V> x) {
+  return {ConvertTo(d.d, x.a), ConvertTo(d.d, x.b)};
 }
 template <class D, class M>
 HWY_INLINE Mask<Twice<D>> RebindMask(Twice<D> d, Pair<M> x) {

@@ -22,11 +22,6 @@ template <class D, class V>
 HWY_INLINE Vec<Twice<D>> GatherIndex(Twice<D> d, const float* from, Pair<V> index) {
   return {GatherIndex(d.d, from, index.a), GatherIndex(d.d, from, index.b)};
 }
-template <class D, class V>
-HWY_INLINE Vec<Twice<D>> ConvertTo(Twice<D> d, Pair<V> x) {
-  return {ConvertTo(d.d, x.a), ConvertTo(d.d, x.b)};
-}
-
 template <class D>
 using TableIndex = Vec<Rebind<std::int32_t, D>>;
 
@@ -187,7 +182,7 @@ HWY_INLINE TableRow<D> SideRow(D d, const SlopeTableView& view, const TableIncid
 
 // A visible normal m, m_z > 0, and the density per solid angle with which the tables draw it.
 template <class D, class V = Vec<D>>
-HWY_INLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
+HWY_NOINLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
                                   V sin_phi, V u1, V u2, V& mx, V& my, V& mz, V& density) {
   const V one = Set(d, 1.0f), two = Set(d, 2.0f), least = Set(d, 0x1p-22f);
   const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
@@ -211,7 +206,7 @@ HWY_INLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, 
 
 // The density of DrawVisibleNormal() at a unit m: 0 where m_z <= 0 or m faces away from i.
 template <class D, class V = Vec<D>>
-HWY_INLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
+HWY_NOINLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
                                   V sin_phi, V mx, V my, V mz) {
   const V one = Set(d, 1.0f), zero = Zero(d);
   const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
@@ -278,7 +273,7 @@ HWY_INLINE V P22(D d, const SlopeTableView& view, V x, V y) {
 
 // The projected area of a unit i, positive wherever anything is visible.
 template <class D, class V = Vec<D>>
-HWY_INLINE V ProjectedArea(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi) {
+HWY_NOINLINE V ProjectedArea(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi) {
   const V one = Set(d, 1.0f), zero = Zero(d);
   const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
   const TablePlace<D> at = incident.At(d, view.areas);
