@@ -434,13 +434,15 @@ std::vector<Result> draw(Operation operation, const Composition& c, const Point&
   return results;
 }
 
-Grid make_grid(Operation operation, const Composition& c, const Point& point, int side) {
+namespace {
+
+Grid answer(Grid grid, Operation operation, const Composition& c, const Point& point) {
+  const int side = grid.side;
   const reference::Surface s = surface_of(c, point);
   const bool reflects = operation != Operation::evaluate_transmission;
   const bool scatters = operation == Operation::evaluate_scattering || !reflects;
   // Of the microfacets that reflect: i turned for retro.
   const Vector i = incident(point), from = c.model.retro ? turned(i) : i;
-  Grid grid{.side = side, .pdf = {}, .value = {}};
   struct Place {
     int event, cell;
     double area;
@@ -457,11 +459,10 @@ Grid make_grid(Operation operation, const Composition& c, const Point& point, in
   const auto jitter = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
   for (int a = 0; a < side; ++a) {
     for (int b = 0; b < side; ++b) {
-      const double t = std::numbers::pi / 2 * (a + jitter()) / side, r = std::tan(t),
-                   dr = 1 / (std::cos(t) * std::cos(t));
+      const double t = grid.t(a + jitter());
       double area = 0;
-      const Vector m = normal_of(s, r, 2 * std::numbers::pi * (b + jitter()) / side, &area);
-      area *= r * dr * (std::numbers::pi / 2 / side) * (2 * std::numbers::pi / side);
+      const Vector m = normal_of(s, std::tan(t), 2 * std::numbers::pi * (b + jitter()) / side, &area);
+      area *= grid.slopes(t);
       if (const double im = dot(from, m); im > 0 && reflects) {
         const Vector o = reflection(from, m);
         if (o.z > 0) add(0, a * side + b, o, area * 4 * im);
@@ -486,6 +487,33 @@ Grid make_grid(Operation operation, const Composition& c, const Point& point, in
   return grid;
 }
 
+}  // namespace
+
+Grid make_grid(Operation operation, const Composition& c, const Point& point, int side) {
+  // The rows that answer, from a coarse grid; from behind they may be few.
+  const Grid coarse = answer({.side = 96, .pdf = {}, .value = {}}, operation, c, point);
+  const double enough = 1e-7 * (coarse.total_pdf() + coarse.total_value());
+  int first = coarse.side, last = -1;
+  for (int row = 0; row < coarse.side; ++row) {
+    double sum = 0;
+    for (int n = row * coarse.side; n < (row + 1) * coarse.side; ++n)
+      sum += coarse.pdf[0][n] + coarse.pdf[1][n] + coarse.value[0][n] + coarse.value[1][n];
+    if (sum <= enough) continue;
+    first = std::min(first, row);
+    last = row;
+  }
+  Grid grid{.side = side, .pdf = {}, .value = {}};
+  if (last >= 0) {
+    grid.low = coarse.t(std::max(first - 1, 0));
+    grid.high = coarse.t(std::min(last + 2, coarse.side));
+  }
+  return answer(grid, operation, c, point);
+}
+
+double Grid::slopes(double t) const {
+  return std::tan(t) / (std::cos(t) * std::cos(t)) * (high - low) * 2 * std::numbers::pi / side / side;
+}
+
 namespace {
 double sum(const std::vector<double> (&of)[2]) {
   double total = 0;
@@ -503,7 +531,7 @@ int cell_of(const Grid& grid, const reference::Surface& s, Vector m) {
   const double y = ((-m.y / m.z - s.mean_slope_y) / s.alpha.y - rho * x) / rest;
   double phi = std::atan2(y, x) / (2 * std::numbers::pi);
   if (phi < 0) phi += 1;
-  const double t = std::atan(std::hypot(x, y)) / (std::numbers::pi / 2);
+  const double t = (std::atan(std::hypot(x, y)) - grid.low) / (grid.high - grid.low);
   const auto part = [&](double at) { return std::clamp(static_cast<int>(at * grid.side), 0, grid.side - 1); };
   return part(t) * grid.side + part(phi);
 }

@@ -121,13 +121,17 @@ std::vector<Point> with_random(const Point& point, std::size_t count, std::uint6
 std::vector<Result> draw(Operation operation, const Composition& composition, const Point& point,
                          std::size_t count, std::uint64_t seed, Statistics* statistics = nullptr);
 
-// A grid of side^2 standard slopes: t = atan(r) in [0, pi/2] and the azimuth, both in equal parts. What an
-// operation (evaluate_and_pdf, evaluate_transmission or evaluate_scattering) answers for what a microfacet
-// somewhere in each cell does to i, times the cell's part of the sphere of o. Not in the middle: edges of a
-// density may run along the grid.
+// A grid of side^2 standard slopes: t = atan(r) in [0, pi/2] and the azimuth, both in equal parts, t of the
+// part of [0, pi/2] that answers. What an operation (evaluate_and_pdf, evaluate_transmission or
+// evaluate_scattering) answers for what a microfacet somewhere in each cell does to i, times the cell's part
+// of the sphere of o. Not in the middle: edges of a density may run along the grid.
 struct Grid {
   int side = 0;
-  std::vector<double> pdf[2], value[2];  // by Event
+  double low = 0, high = 1.57079632679489662;  // of t
+  std::vector<double> pdf[2], value[2];        // by Event
+  double t(double row) const { return low + (high - low) * row / side; }
+  // The area of standard slopes of a cell, r dr dphi at t.
+  double slopes(double t) const;
   double total_pdf() const;
   double total_value() const;
 };

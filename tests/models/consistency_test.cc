@@ -296,7 +296,8 @@ TEST_P(ModelConsistency, BadLanesAreZeroAndDisturbNoOther) {
   std::uint64_t seed = 3000;
   for (const Operation operation : operations())
     for (const Composition& c : all_compositions(GetParam(), operation)) {
-      const std::vector<Point> points = adversarial(c, kLanes / 4 + 3, ++seed), bad = corrupted(points, seed);
+      const std::vector<Point> points = adversarial(c, std::max<std::size_t>(kLanes / 4, 256) + 3, ++seed),
+                               bad = corrupted(points, seed);
       const std::vector<Result> good = run_points(operation, c, points),
                                 results = run_points(operation, c, bad);
       std::size_t invalid = 0;

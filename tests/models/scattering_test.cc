@@ -17,8 +17,6 @@ using reference::Vector;
 constexpr double kUnit = 0x1p-24;
 constexpr std::size_t kCount = kQuick ? 10'000 : 100'000;
 constexpr int kSide = kQuick ? 96 : 288;
-// From behind, all of Beckmann is in a few rows.
-constexpr int kFineSide = 2 * kSide;
 constexpr double kAnyFailure = 0.01;
 constexpr int kTests = 300;  // chi-square tests of this file, roughly
 
@@ -121,16 +119,16 @@ ChiSquare test_scattering(const Composition& c, const Point& point, const Point&
                           std::uint64_t seed) {
   const Operation query = forced ? Operation::evaluate_transmission : Operation::evaluate_scattering;
   const reference::Surface s = surface_of(c, point);
-  const Grid grid = make_grid(query, c, claim, kFineSide);
+  const Grid grid = make_grid(query, c, claim, kSide);
   constexpr int kGroups = 12;
   // Parts of the grid that are of about equal weight, by row and column.
   std::vector<int> of[2];
   for (const bool column : {false, true}) {
-    std::vector<double> parts(kFineSide);
+    std::vector<double> parts(kSide);
     double total = 0, sum = 0;
-    for (int n = 0; n < kFineSide * kFineSide; ++n)
+    for (int n = 0; n < kSide * kSide; ++n)
       for (const auto& pdf : grid.pdf) {
-        parts[column ? n % kFineSide : n / kFineSide] += pdf[n];
+        parts[column ? n % kSide : n / kSide] += pdf[n];
         total += pdf[n];
       }
     for (const double part : parts) {
@@ -139,13 +137,13 @@ ChiSquare test_scattering(const Composition& c, const Point& point, const Point&
     }
   }
   const auto cell = [&](int event, int n) {
-    return (event * kGroups + of[0][n / kFineSide]) * kGroups + of[1][n % kFineSide];
+    return (event * kGroups + of[0][n / kSide]) * kGroups + of[1][n % kSide];
   };
   std::vector<double> expected(2 * kGroups * kGroups + 1);
   std::vector<std::uint64_t> counts(expected.size());
   double sum = 0;
   for (int event = 0; event < 2; ++event)
-    for (int n = 0; n < kFineSide * kFineSide; ++n) {
+    for (int n = 0; n < kSide * kSide; ++n) {
       expected[cell(event, n)] += grid.pdf[event][n] * kCount;
       sum += grid.pdf[event][n] * kCount;
     }
