@@ -30,7 +30,8 @@ bool reads_sampler(Operation operation) {
 bool scatters(Operation operation) { return operation >= Operation::sample_transmission; }
 
 const SurfaceKernels& surface_of(const DistributionKernels& kernels, Masking masking, bool affine) {
-  if (masking == Masking::vcavity) return kernels.vcavity;
+  static constexpr SurfaceKernels kNone{};
+  if (masking == Masking::vcavity) return affine ? kNone : kernels.vcavity;
   return affine ? kernels.smith_affine : kernels.smith;
 }
 

@@ -132,7 +132,8 @@ struct Ggx {
     const V slope = along * inverse, across = t1 * inverse;
     x = Fms(slope, ex, across * ey);
     y = Fma(slope, ey, across * ex);
-    im = nu * Select(first, Fms(s, t2, k * up), up) / z;
+    // By the slope itself, so that o is its reflection.
+    im = NegFma(i.wx, x, NegFma(i.wy, y, i.wz));
   }
 
   // K / sigma(i).

@@ -131,7 +131,8 @@ struct Inputs {
   using V = Vec<D>;
   static constexpr float kLargestRoughness = S::Distribution::kLargestRoughness;
   V x, y, z, ax, ay;
-  V mean_x, mean_y, correlation;  // if the surface is affine
+  V mean_x, mean_y;  // if the surface is affine
+  Mask<D> moments_valid;
   Rotation<D> rotation;
 
   HWY_INLINE Inputs(D d, const Tile& tile, std::size_t lane)
@@ -143,7 +144,9 @@ struct Inputs {
     if constexpr (S::kAffine) {
       mean_x = LoadU(d, tile.in[kMeanX] + lane);
       mean_y = LoadU(d, tile.in[kMeanY] + lane);
-      correlation = LoadU(d, tile.in[kCorrelation] + lane);
+      const V correlation = LoadU(d, tile.in[kCorrelation] + lane), largest = Set(d, kLargestMeanSlope);
+      moments_valid =
+          And(And(Abs(mean_x) <= largest, Abs(mean_y) <= largest), Abs(correlation) < Set(d, 1.0f));
       rotation = PrincipalAxes(d, correlation, ax, ay);
       rotation.In(x, y);
       rotation.In(mean_x, mean_y);
@@ -157,13 +160,13 @@ struct Inputs {
   HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane, const QuickTest<D>& test) const {
     if (!test.AllOrdinary(ax, ay, kLargestRoughness)) return false;
     if constexpr (S::kAffine)
-      if (!AllTrue(d, ValidMoments(d))) return false;
+      if (!AllTrue(d, moments_valid)) return false;
     return tile.interface == Interface::conductor || AllTrue(d, ValidInterface(d, tile, lane));
   }
 
   HWY_INLINE Policy<D> Classified(D d, const Tile& tile, std::size_t lane, Mask<D> valid) const {
     valid = And(valid, UnitLength(d, x, y, z));
-    if constexpr (S::kAffine) valid = And(valid, ValidMoments(d));
+    if constexpr (S::kAffine) valid = And(valid, moments_valid);
     if (tile.interface != Interface::conductor) valid = And(valid, ValidInterface(d, tile, lane));
     return Classify(d, valid, ax, ay, kLargestRoughness);
   }
@@ -186,13 +189,6 @@ struct Inputs {
   }
   HWY_INLINE void Out(V& x_, V& y_) const {
     if constexpr (S::kAffine) rotation.Out(x_, y_);
-  }
-
- private:
-  // Exactly 1 as a correlation is a roughness of 0.
-  HWY_INLINE Mask<D> ValidMoments(D d) const {
-    const V largest = Set(d, 1.5f * kLargestMeanSlope);
-    return And(And(Abs(mean_x) <= largest, Abs(mean_y) <= largest), Abs(correlation) < Set(d, 1.0f));
   }
 };
 

@@ -102,7 +102,9 @@ struct Scatter {
     const auto accepted = total > zero;
     const V branch = IfThenElseZero(accepted, Select(reflects, reflected, transmitted) / total);
 
-    const V ox = Select(reflects, rx, tx), oy = Select(reflects, ry, ty), oz = Select(reflects, rz, tz);
+    // Where nothing is refracted the occluded direction is the reflection's.
+    const auto bends = AndNot(reflects, And(seen, refraction.g > zero));
+    const V ox = Select(bends, tx, rx), oy = Select(bends, ty, ry), oz = Select(bends, tz, rz);
 
     V pdf = zero;
     if (tile.wanted & kWantsPdf) {
@@ -132,8 +134,8 @@ struct Scatter {
     }
 
     V out_x = ox, out_y = oy, mirror_x = mirror.x, mirror_y = mirror.y, out_mx = mx, out_my = my;
-    Turn(d, tile, reflects, out_x, out_y);
-    Turn(d, tile, reflects, out_mx, out_my);
+    Turn(d, tile, Not(bends), out_x, out_y);
+    Turn(d, tile, Not(bends), out_mx, out_my);
     Turn(d, tile, mirror.reflects, mirror_x, mirror_y);
     in.Out(out_x, out_y);
     in.Out(out_mx, out_my);

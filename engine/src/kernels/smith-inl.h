@@ -72,12 +72,13 @@ struct Smith {
   static HWY_INLINE V Weight(D d, const I& i, const Drawn& drawn, V ox, V oy, V oz, bool uncorrelated) {
     V lit, all;
     Shadowing(d, i, ox, oy, oz, uncorrelated, lit, all);
-    if constexpr (!Sampler::kNIsSigma) {
+    if constexpr (HasOwnShift<Sampler>) {
+      lit = lit * (drawn.two_n / i.tn) * Exp(d, Neg(drawn.shift));
+    } else if constexpr (!Sampler::kNIsSigma) {
       lit = lit * drawn.two_n;
       all = all * i.tn;
       if constexpr (I::Distribution::kShifts && !Sampler::kShifted)
         if (!i.all_front) lit = lit * Exp(d, i.shift);
-      if constexpr (HasOwnShift<Sampler>) lit = lit * Exp(d, Neg(drawn.shift));
     }
     return lit / all;
   }

@@ -85,7 +85,7 @@ struct StudentT : SlopeDistribution<StudentT> {
   // solved by three Halley steps: error of F 6e-7. They start from the solutions for T = 1 and T = infinity in
   // q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's share is that of a fixed density.
   template <class D, class I, class V = Vec<D>>
-  static HWY_NOINLINE void DrawVisible(D d, const I& i, V, V, V u1, V u2, V& x, V& y, V& gap) {
+  static HWY_NOINLINE void DrawVisible(D d, const I& i, V c_i, V s_i, V u1, V u2, V& x, V& y, V& gap) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f);
     V nu;
     const V sum = Sum(d, i.wz, i.a, nu);
@@ -130,6 +130,8 @@ struct StudentT : SlopeDistribution<StudentT> {
     gap = gone * Fma(t2, z, one) / (z * one_t2) * (nu / i.nu);
     const V root2 = Set(d, 1.41421356f);
     x = root2 * scaled;
+    // Near straight down, where T is not w's, by the slope.
+    gap = Select(t_max > Set(d, 64.0f), Max(NegFma(s_i, x, c_i), zero), gap);
     // y = sqrt(1 + x^2) times a number with density ~ (1 + y^2)^-3.
     y = root2 * (half * (t + one / t)) * Conditional(d, u2);
   }
