@@ -8,15 +8,63 @@
 #include "app/errors.h"
 #include "app/verbs.h"
 #include "facetwise/client.h"
+#include "facetwise/slope_table.h"
+#include "wire/fields.h"
 
 namespace facetwise::app {
 
-void add_model(CLI::App& app, Model& model) {
-  add_named(app, "--distribution", model.distribution, parse_distribution,
-            "Distribution of normals; default ggx", "ggx");
-  add_named(app, "--masking", model.masking, parse_masking, "Masking function; default smith", "smith");
+namespace {
+
+constexpr std::string_view kTable = "table:";
+constexpr const char* kDistributions = "ggx|beckmann|student_t|phong|table:FILE";
+
+// Reads the table of slopes of `--distribution table:FILE`.
+absl::StatusOr<std::shared_ptr<const SlopeTable>> read_slope_table(const std::string& path) {
+  return SlopeTable::load_any(path, {});
+}
+
+}  // namespace
+
+void ModelArguments::add(CLI::App& app) {
+  app.add_option_function<std::string>(
+         "--distribution",
+         [this](const std::string& text) {
+           const bool is_table = text.starts_with(kTable) && text.size() > kTable.size();
+           const auto parsed = is_table ? Distribution::table : parse_distribution(text);
+           if (!parsed || (*parsed == Distribution::table && !is_table))
+             throw CLI::ValidationError("--distribution",
+                                        fmt::format("\"{}\" is not one of {}", text, kDistributions));
+           model.distribution = *parsed;
+           table = is_table ? text.substr(kTable.size()) : "";
+         },
+         "Distribution of normals; default ggx. A table is a file of slopes' densities")
+      ->type_name(kDistributions);
+  add_named(app, "--masking", model.masking, parse_masking,
+            "Masking function; default smith; phong has vcavity alone", "smith|vcavity");
   add_named(app, "--shadowing", model.shadowing, parse_shadowing,
             "Masking-shadowing of weights and values; default correlated", "correlated|uncorrelated");
+  add_named(app, "--normalisation", model.normalisation, parse_normalisation,
+            "Densities of visible normals for directions behind the surface; default unbiased",
+            "unbiased|biased");
+  add_named(app, "--interface", model.interface, parse_interface,
+            "What reflects: all (conductor, the default), by Schlick's formula (f0, f90) or Fresnel's (eta)",
+            "conductor|schlick|dielectric");
+  add_named(app, "--transport", model.transport, parse_transport,
+            "What transmission carries; default radiance", "radiance|importance");
+  app.add_flag("--retro", model.retro, "Reflect back to where the light comes from");
+}
+
+absl::StatusOr<Model> ModelArguments::open() const {
+  Model opened = model;
+  if (table.empty()) return opened;
+  auto read = read_slope_table(table);
+  if (!read.ok()) return read.status();
+  opened.table = *std::move(read);
+  return opened;
+}
+
+Sampler default_sampler(Operation operation, const Model& model) {
+  return wire::default_sampler(operation, model);
 }
 
 void EngineArguments::add_remote(CLI::App& app) {

@@ -32,10 +32,20 @@ CLI::Option* add_named(CLI::App& app, const std::string& flag, T& value, Parse p
       ->type_name(names);
 }
 
-// --distribution, --masking, --shadowing.
-void add_model(CLI::App& app, Model& model);
+inline constexpr const char* kSamplerNames = "ndf|heitz|cap|bounded|exact|visible";
 
-inline constexpr const char* kSamplerNames = "ndf|heitz|cap|bounded|exact";
+// --distribution, --masking, --shadowing, --normalisation, --interface, --transport, --retro.
+struct ModelArguments {
+  Model model;
+  std::string table;  // of `--distribution table:FILE`
+
+  void add(CLI::App& app);
+  // The model, its table read.
+  absl::StatusOr<Model> open() const;
+};
+
+// The sampler that a verb means where none is named: exact where the model has it, else visible.
+Sampler default_sampler(Operation operation, const Model& model);
 
 // Which engine runs a call: this machine's, or servers.
 struct EngineArguments {

@@ -13,8 +13,8 @@ namespace {
 v1::BenchmarkResult to_message(const BenchResult& result) {
   v1::BenchmarkResult message;
   message.set_operation(std::string(name(result.operation)));
-  message.set_distribution(std::string(name(Distribution::ggx)));
-  message.set_masking(std::string(name(Masking::smith)));
+  message.set_distribution(result.distribution);
+  message.set_masking(result.masking);
   message.set_sampler(result.sampler);
   message.set_alpha_x(result.alpha_x);
   message.set_alpha_y(result.alpha_y);
@@ -31,6 +31,8 @@ v1::BenchmarkResult to_message(const BenchResult& result) {
 BenchResult from_message(const v1::BenchmarkResult& message) {
   BenchResult result;
   result.operation = parse_operation(message.operation()).value_or(Operation::sample_reflection);
+  result.distribution = message.distribution();
+  result.masking = message.masking();
   result.sampler = message.sampler();
   result.alpha_x = message.alpha_x();
   result.alpha_y = message.alpha_y();

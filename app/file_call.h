@@ -18,6 +18,7 @@ struct FileCall {
   Model model;
   Sampler sampler = Sampler::exact;
   std::vector<float> alpha;           // alpha_x, and alpha_y if it differs, for all lanes; else columns
+  std::optional<float> eta, f0, f90;  // for all lanes; else columns
   std::optional<std::uint64_t> seed;  // of the generator; else columns u1, u2, u3
   std::uint64_t first_id = 0;
   std::string input = "-", output = "-";

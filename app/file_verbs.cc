@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "app/arguments.h"
 #include "app/file_call.h"
@@ -17,10 +18,15 @@ constexpr const char* kFiles = R"(Files are .csv, .npy, or "-" for CSV through s
 CSV: a header line with the columns' names, then one line per lane.
 .npy: a one-dimensional structured array whose fields are little-endian float32 ('<f4').
   ix iy iz         incident direction, a unit vector in the local frame that points away from the surface
-  alpha_x alpha_y  roughness: the distribution's own parameter, 1e-4 to 10 (or --alpha)
+  alpha_x alpha_y  roughness: the distribution's own parameter, 1e-4 to 10, phong to 1 (or --alpha)
+  mean_slope_x mean_slope_y slope_correlation
+                   moments of the slopes, 0 where they are left out; ggx, beckmann and tables with smith
+  eta              eta_o / eta_i, 0.01 to 100; --interface dielectric (or --eta)
+  f0 f90           reflectance straight on, and grazing (1 if left out); --interface schlick (or --f0, --f90)
 )";
 constexpr const char* kRandomColumns =
-    "  u1 u2 u3         uniform numbers in [0, 1); u3 for the sampler exact alone (or --seed)\n";
+    "  u1 u2 u3         uniform numbers in [0, 1) (or --seed); u3 for --scattering, for the sampler exact and,\n"
+    "                   with --masking vcavity, for visible\n";
 constexpr const char* kQueryColumns = "  ox oy oz         outgoing direction\n";
 constexpr const char* kStatus =
     R"(  status           0 accepted, 1 occluded, 2 smooth (alpha below 1e-4), 3 invalid (NaN, not a unit
@@ -29,17 +35,35 @@ constexpr const char* kStatus =
 
 struct FileVerb {
   FileCall call;
+  ModelArguments model;
   EngineArguments engine;
   std::optional<Sampler> sampler;
-  bool normals = false;
   bool json = false;
 };
+
+// A flag that makes another operation of the verb.
+struct Variant {
+  const char* flag;
+  Operation operation;
+  const char* help;
+};
+constexpr Variant kSampleVariants[] = {
+    {"--normals", Operation::sample_normal, "Sample microfacet normals instead of reflections"},
+    {"--transmission", Operation::sample_transmission,
+     "Sample what goes through a dielectric instead of reflections"},
+    {"--scattering", Operation::sample_scattering, "Sample either of the two, as a dielectric reflects"}};
+constexpr Variant kEvaluateVariants[] = {
+    {"--transmission", Operation::evaluate_transmission, "Of what goes through a dielectric"},
+    {"--scattering", Operation::evaluate_scattering, "Of both, each on its side of the surface"}};
 
 void report(const std::string& verb, const FileVerb& verb_arguments, const FileCallResult& result) {
   const FileCall& call = verb_arguments.call;
   const Statistics& s = result.statistics;
   if (verb_arguments.json) {
     const nlohmann::ordered_json json = {{"operation", name(call.operation)},
+                                         {"distribution", name(call.model.distribution)},
+                                         {"masking", name(call.model.masking)},
+                                         {"interface", name(call.model.interface)},
                                          {"sampler", name(call.sampler)},
                                          {"engine", verb_arguments.engine.shown()},
                                          {"lanes", s.lanes()},
@@ -61,8 +85,8 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
 }
 
-Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, const std::string& about,
-                   const std::string& columns) {
+Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation,
+                   std::span<const Variant> variants, const std::string& about, const std::string& columns) {
   auto arguments = std::make_shared<FileVerb>();
   FileCall& call = arguments->call;
   call.operation = operation;
@@ -71,17 +95,29 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   command.add_option("-i,--input", call.input, "File with one lane per row; default -")->type_name("FILE");
   command.add_option("-o,--output", call.output, "File to write; default -. It appears when it is complete")
       ->type_name("FILE");
-  add_model(command, call.model);
+  arguments->model.add(command);
   add_named(command, "--sampler", arguments->sampler, parse_sampler,
             operation == Operation::sample_reflection
-                ? "How directions are drawn; default exact (cap with --normals)"
-                : "The sampler whose pdf is meant; default exact",
+                ? "How directions are drawn; default exact where the model has it, else visible"
+                : "The sampler whose pdf is meant; default exact where the model has it, else visible",
             kSamplerNames);
   command.add_option("--alpha", call.alpha, "Roughness of all lanes: alpha_x and, if it differs, alpha_y")
       ->expected(1, 2)
       ->type_name("X [Y]");
+  const auto add_constant = [&](const char* flag, std::optional<float>& value, const char* help) {
+    command.add_option(flag, value, help)->option_text("X");
+  };
+  add_constant("--eta", call.eta, "eta of all lanes");
+  add_constant("--f0", call.f0, "f0 of all lanes");
+  add_constant("--f90", call.f90, "f90 of all lanes");
+  std::vector<CLI::Option*> others;
+  for (const Variant& variant : variants) {
+    auto* flag = command.add_flag_callback(
+        variant.flag, [&call, &variant] { call.operation = variant.operation; }, variant.help);
+    for (CLI::Option* other : others) flag->excludes(other);
+    others.push_back(flag);
+  }
   if (operation == Operation::sample_reflection) {
-    command.add_flag("--normals", arguments->normals, "Sample microfacet normals instead of reflections");
     auto* seed = command.add_option("--seed", call.seed, "Seed of the generator of u1 u2 u3")->type_name("N");
     command.add_option("--first-id", call.first_id, "The first lane's id in the generator; default 0")
         ->needs(seed)
@@ -92,8 +128,10 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   command.add_flag("--json", arguments->json, "Counts of lanes as JSON (on standard error)");
   return {&command, [arguments, verb] {
             FileCall& call = arguments->call;
-            if (arguments->normals) call.operation = Operation::sample_normal;
-            call.sampler = arguments->sampler.value_or(arguments->normals ? Sampler::cap : Sampler::exact);
+            auto model = arguments->model.open();
+            if (!model.ok()) return fail(verb, model.status());
+            call.model = *std::move(model);
+            call.sampler = arguments->sampler.value_or(default_sampler(call.operation, call.model));
             auto engine = arguments->engine.open();
             if (!engine.ok()) return fail(verb, engine.status());
             const auto result = run_on_files(call, **engine);
@@ -106,22 +144,28 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
 }  // namespace
 
 Verb add_sample(CLI::App& app) {
-  return add_file_verb(app, "sample", Operation::sample_reflection,
-                       "Sample reflections, or microfacet normals, for the incident directions of a file",
+  return add_file_verb(app, "sample", Operation::sample_reflection, kSampleVariants,
+                       "Sample reflections, transmissions or normals for the incident directions of a file",
                        std::string(kFiles) + kRandomColumns + R"(Written:
-  ox oy oz         the reflection (not with --normals)
+  ox oy oz         the direction (not with --normals)
   mx my mz         the microfacet normal
-  pdf              density per steradian: of the reflection, with --normals of the normal
-  weight           f cos(theta_o) / pdf with F = 1 (not with --normals)
+  pdf              density per steradian: of the direction, with --normals of the normal
+  weight           f |cos(theta_o)| / pdf (not with --normals)
+  branch_probability
+                   with which the event was chosen (--scattering)
+  eta_scale        what a path divides its weight by to compare it (--transmission, --scattering)
+  event            0 reflection, 1 transmission (--scattering)
 )" + kStatus + R"(
 Examples:
   facetwise sample --sampler exact --seed 1 --input rays.csv --output samples.csv
   facetwise sample --sampler bounded --seed 1 --alpha 0.8 0.1 --input rays.npy --output samples.npy
+  facetwise sample --scattering --distribution beckmann --interface dielectric --eta 1.5 --seed 1 \
+      --alpha 0.2 --input rays.csv --output samples.csv
   printf 'ix,iy,iz,u1,u2\n0,0,1,0.25,0.5\n' | facetwise sample --normals --alpha 0.3)");
 }
 
 Verb add_pdf(CLI::App& app) {
-  return add_file_verb(app, "pdf", Operation::pdf_reflection,
+  return add_file_verb(app, "pdf", Operation::pdf_reflection, {},
                        "Density of a sampler at outgoing directions of a file",
                        std::string(kFiles) + kQueryColumns + R"(Written:
   pdf              density per steradian with which the sampler draws the outgoing direction
@@ -131,11 +175,13 @@ Example:
 }
 
 Verb add_evaluate(CLI::App& app) {
-  return add_file_verb(app, "evaluate", Operation::evaluate_and_pdf,
-                       "Values f cos(theta_o), and a sampler's density, at outgoing directions of a file",
+  return add_file_verb(app, "evaluate", Operation::evaluate_and_pdf, kEvaluateVariants,
+                       "Values f |cos(theta_o)|, and a sampler's density, at outgoing directions of a file",
                        std::string(kFiles) + kQueryColumns + R"(Written:
   pdf              density per steradian with which the sampler draws the outgoing direction
-  value            f cos(theta_o) with F = 1, per steradian
+  value            f |cos(theta_o)|, per steradian
+  branch_probability
+                   of the event that the outgoing direction means (--scattering)
 )" + kStatus + R"(
 Example:
   facetwise evaluate --shadowing uncorrelated --alpha 0.3 --input pairs.csv --output values.csv)");

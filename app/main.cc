@@ -11,7 +11,8 @@
 namespace {
 
 constexpr const char* kAbout =
-    "facetwise samples microfacet normals and reflections (GGX, Smith) in bulk: here, or on servers.\n"
+    "facetwise samples microfacet surfaces (GGX, Beckmann and others; Smith, V-cavity) in bulk: here, or on "
+    "servers.\n"
     "`facetwise VERB --help` explains a verb.";
 
 constexpr const char* kExamples = R"(Examples:

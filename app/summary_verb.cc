@@ -14,6 +14,7 @@
 #include "app/arguments.h"
 #include "app/errors.h"
 #include "app/verbs.h"
+#include "facetwise/bench.h"
 
 namespace facetwise::app {
 namespace {
@@ -31,6 +32,12 @@ absl::StatusOr<Json> read_json(const std::string& path) {
   return json;
 }
 
+// GGX with Smith masking where neither is said.
+std::string sampler_name(const Json& json) {
+  return bench_name(json.value("distribution", "ggx"), json.value("masking", "smith"),
+                    json.at("sampler").get<std::string>());
+}
+
 // The rates of one operation, sampler and roughness; each implementation at its best batch size.
 struct Row {
   std::array<double, kCount> rate{};  // samples per second, 0 if not measured
@@ -44,7 +51,7 @@ std::string ratio(double a, double b) { return a > 0 && b > 0 ? fmt::format("{:.
 
 struct Table {
   struct Group {
-    std::string operation, sampler;
+    std::string operation, sampler;  // as in the benchmarks' names
     std::map<std::pair<double, double>, Row> by_alpha;
   };
   std::vector<Group> groups;  // in the report's order
@@ -55,7 +62,7 @@ struct Table {
           std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
       if (found == kImplementations.end() || result.value("inputs", "columns") != "columns") continue;
       const Json& alpha = result.at("alpha");
-      Row& row = group(result.at("operation"), result.at("sampler")).by_alpha[{alpha.at(0), alpha.at(1)}];
+      Row& row = group(result.at("operation"), sampler_name(result)).by_alpha[{alpha.at(0), alpha.at(1)}];
       double& rate = row.rate[static_cast<std::size_t>(found - kImplementations.begin())];
       rate = std::max(rate, result.at("samples_per_second").get<double>());
     }
@@ -68,7 +75,7 @@ struct Table {
   }
 
   void print() const {
-    constexpr const char* kLine = "  {:<20} {:<8} {:>9} {:>7} {:>9} {:>7} {:>8} {:>7} {:>12} {:>13} {:>12}\n";
+    constexpr const char* kLine = "  {:<20} {:<24} {:>9} {:>7} {:>9} {:>7} {:>8} {:>7} {:>12} {:>13} {:>12}\n";
     fmt::print("\nThroughput, million samples a second, each at its best batch size\n");
     fmt::print(kLine, "operation", "sampler", "alpha", "scalar", "one lane", "SIMD", "threads", "remote",
                "SIMD/scalar", "threads/SIMD", "remote/SIMD");
@@ -102,7 +109,7 @@ void print_verification(const Json& verification) {
   for (const Json& sampler : verification.at("reflections")) {
     const auto occluded = sampler.at("occluded").get<std::uint64_t>(),
                samples = sampler.at("samples").get<std::uint64_t>();
-    fmt::print("  {:<8} {:>9} of {} ({:.2f} %)\n", sampler.at("sampler").get<std::string>(), occluded,
+    fmt::print("  {:<24} {:>9} of {} ({:.2f} %)\n", sampler_name(sampler), occluded,
                samples, percent(occluded, samples));
   }
 }

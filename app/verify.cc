@@ -17,7 +17,7 @@ namespace {
 struct Answer {
   std::vector<std::vector<float>>
       columns;  // as output_fields(); empty where the operation has no such output
-  std::vector<std::uint8_t> status;
+  std::vector<std::vector<std::uint8_t>> bytes;  // as byte_fields()
   Statistics statistics;
   double seconds = 0;
 };
@@ -31,8 +31,12 @@ absl::StatusOr<Answer> ask(Engine& engine, Operation operation, Batch batch, std
     column.assign(batch.lanes, std::bit_cast<float>(fill));
     field.column(batch) = OutputColumn<float>(column);
   }
-  answer.status.assign(batch.lanes, static_cast<std::uint8_t>(fill));
-  batch.out.status = answer.status;
+  for (const ByteField& field : byte_fields()) {
+    auto& column = answer.bytes.emplace_back();
+    if (!(field.operations & bit(operation))) continue;
+    column.assign(batch.lanes, static_cast<std::uint8_t>(fill));
+    field.column(batch) = OutputColumn<std::uint8_t>(column);
+  }
   const auto start = std::chrono::steady_clock::now();
   auto statistics = engine.run(operation, batch);
   if (!statistics.ok()) return statistics.status();
@@ -58,14 +62,17 @@ std::string difference(const Answer& remote, const Answer& local) {
     if (auto text = column_difference(output_fields()[k].name, remote.columns[k], local.columns[k]);
         !text.empty())
       return text;
-  if (auto text = column_difference("out.status", remote.status, local.status); !text.empty()) return text;
+  for (std::size_t k = 0; k < local.bytes.size(); ++k)
+    if (auto text = column_difference(byte_fields()[k].name, remote.bytes[k], local.bytes[k]); !text.empty())
+      return text;
   if (remote.statistics != local.statistics) return "the statistics differ";
   return {};
 }
 
 std::uint64_t bytes(const Answer& answer) {
-  std::uint64_t total = answer.status.size();
+  std::uint64_t total = 0;
   for (const auto& column : answer.columns) total += column.size() * sizeof(float);
+  for (const auto& column : answer.bytes) total += column.size();
   return total;
 }
 
@@ -78,7 +85,22 @@ std::vector<float> uniform_numbers(std::size_t count, std::uint64_t seed) {
 }
 
 bool samples(Operation operation) {
-  return operation == Operation::sample_normal || operation == Operation::sample_reflection;
+  return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
+         operation == Operation::sample_transmission || operation == Operation::sample_scattering;
+}
+
+bool reads(Operation operation, std::string_view name) {
+  const auto fields = input_fields();
+  return std::any_of(fields.begin(), fields.end(), [&](const InputField& field) {
+    return field.name == name && (field.operations & bit(operation));
+  });
+}
+
+// What draws the directions that a query is asked about.
+Operation drawing(Operation query) {
+  if (query == Operation::evaluate_transmission) return Operation::sample_transmission;
+  if (query == Operation::evaluate_scattering) return Operation::sample_scattering;
+  return Operation::sample_reflection;
 }
 
 // The inputs of a batch besides what was traced. The batch's columns point into it.
@@ -86,15 +108,26 @@ struct Inputs {
   scene::Lanes lanes;
   std::vector<float> u1, u2, u3;
   std::vector<float> ox, oy, oz;
+  std::vector<float> mean_slope_x, correlation, eta, f0;
 
   absl::StatusOr<Batch> batch(const VerifyCase& what, std::uint64_t seed) {
     Batch batch;
-    batch.model.shadowing = what.shadowing;
+    batch.model = what.model;
     batch.sampler = what.sampler;
     batch.lanes = lanes.size();
     batch.incident = {lanes.incident_x, lanes.incident_y, lanes.incident_z};
     batch.alpha_x = lanes.alpha_x;
     batch.alpha_y = lanes.alpha_y;
+    if (what.moments) {
+      mean_slope_x = scaled(0.5f, -0.25f, seed + 11);
+      correlation = scaled(1.5f, -0.75f, seed + 12);
+      batch.mean_slope_x = mean_slope_x;
+      batch.mean_slope_y = 0.125f;
+      batch.slope_correlation = correlation;
+    }
+    if (what.model.interface == Interface::dielectric) eta = scaled(1.5f, 0.6f, seed + 13);
+    if (what.model.interface == Interface::schlick) f0 = scaled(0.9f, 0.02f, seed + 14);
+    set_interface(what.operation, batch);
     if (samples(what.operation)) {
       if (what.generator) {
         batch.generator.emplace().seed = seed;
@@ -104,41 +137,101 @@ struct Inputs {
       u2 = uniform_numbers(lanes.size(), 3 * seed + 1);
       batch.u1 = u1;
       batch.u2 = u2;
-      if (uses_u3(what.sampler)) {
+      if (uses_u3(what.model, what.sampler) || what.operation == Operation::sample_scattering) {
         u3 = uniform_numbers(lanes.size(), 3 * seed + 2);
         batch.u3 = u3;
       }
     } else if (what.operation != Operation::masking) {
-      // Directions that light comes from: reflections by visible normals, some of them below the surface.
+      // Directions that light comes from: by visible normals, some of them on the wrong side.
       for (auto* column : {&ox, &oy, &oz}) column->resize(lanes.size());
       Batch directions = batch;
-      directions.sampler = Sampler::cap;
+      directions.sampler = Sampler::visible;
       directions.generator.emplace().seed = seed;
       directions.out.outgoing = {ox, oy, oz};
-      if (auto status = sample_reflection(directions); !status.ok()) return status.status();
+      set_interface(drawing(what.operation), directions);
+      if (auto status = run(drawing(what.operation), directions); !status.ok()) return status.status();
       batch.outgoing = {ox, oy, oz};
     }
     return batch;
   }
+
+ private:
+  std::vector<float> scaled(float by, float from, std::uint64_t seed) const {
+    auto numbers = uniform_numbers(lanes.size(), seed);
+    for (float& number : numbers) number = from + by * number;
+    return numbers;
+  }
+
+  void set_interface(Operation operation, Batch& batch) const {
+    batch.eta = batch.f0 = {};
+    if (!eta.empty() && reads(operation, "eta")) batch.eta = eta;
+    if (!f0.empty() && reads(operation, "f0")) batch.f0 = f0;
+  }
 };
 
-}  // namespace
-
-std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
-  std::vector<VerifyCase> cases;
+void add_ggx_smith(std::span<const Sampler> samplers, std::vector<VerifyCase>& cases) {
   for (const bool generator : {true, false})
     for (const Sampler sampler : samplers)
-      cases.push_back(
-          {.operation = Operation::sample_reflection, .sampler = sampler, .generator = generator});
+      cases.push_back({.operation = Operation::sample_reflection, .sampler = sampler, .generator = generator});
   for (const Sampler sampler : samplers)
     if (samples_normals(sampler) && sampler != Sampler::ndf)
       cases.push_back({.operation = Operation::sample_normal, .sampler = sampler});
   cases.push_back({.operation = Operation::pdf_reflection, .sampler = samplers.back()});
   cases.push_back({.operation = Operation::evaluate_reflection, .sampler = samplers.back()});
   cases.push_back({.operation = Operation::evaluate_and_pdf,
-                   .sampler = samplers[samplers.size() > 1 ? samplers.size() - 2 : 0],
-                   .shadowing = Shadowing::uncorrelated});
+                   .model = {.shadowing = Shadowing::uncorrelated},
+                   .sampler = samplers[samplers.size() > 1 ? samplers.size() - 2 : 0]});
   cases.push_back({.operation = Operation::masking, .sampler = samplers.back()});
+}
+
+// What `samplers` have of a composition, each operation that reads a sampler with each that fits. What else a model
+// can be goes round with them.
+void add_composition(const Model& composition, std::span<const Sampler> samplers, std::vector<VerifyCase>& cases) {
+  const bool ggx_smith = composition.distribution == Distribution::ggx && composition.masking == Masking::smith;
+  bool any = false;
+  std::size_t turn = 0;
+  for (const Operation operation : all_operations()) {
+    const bool scatters = operation >= Operation::sample_transmission;
+    if (ggx_smith && !scatters) continue;  // add_ggx_smith()
+    Model model = composition;
+    model.interface = scatters ? Interface::dielectric : Interface::conductor;
+    for (const Sampler sampler : samplers_for(operation, model)) {
+      if (std::find(samplers.begin(), samplers.end(), sampler) == samplers.end()) continue;
+      any = true;
+      VerifyCase what{.operation = operation, .model = model, .sampler = sampler, .generator = ++turn % 2 == 0};
+      if (turn % 3 == 0) what.model.shadowing = Shadowing::uncorrelated;
+      if (turn % 3 == 1) what.model.normalisation = Normalisation::biased;
+      if (turn % 4 == 1) what.model.transport = Transport::importance;
+      if (!scatters && operation != Operation::sample_normal)
+        what.model.interface = turn % 2 == 0 ? Interface::schlick : Interface::dielectric;
+      if (turn % 5 == 3) what.model.retro = true;
+      cases.push_back(what);
+    }
+  }
+  if (!any || ggx_smith) return;
+  const Sampler sampler = samplers.back();
+  cases.push_back({.operation = Operation::evaluate_reflection, .model = composition, .sampler = sampler});
+  cases.push_back({.operation = Operation::masking, .model = composition, .sampler = sampler});
+}
+
+}  // namespace
+
+std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
+  std::vector<VerifyCase> cases;
+  add_ggx_smith(samplers, cases);
+  for (const Distribution distribution :
+       {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong})
+    for (const Masking masking : {Masking::smith, Masking::vcavity})
+      add_composition({.distribution = distribution, .masking = masking}, samplers, cases);
+  // Mean slopes and correlated roughness.
+  if (std::find(samplers.begin(), samplers.end(), Sampler::visible) == samplers.end()) return cases;
+  for (const Distribution distribution : {Distribution::ggx, Distribution::beckmann})
+    for (const Operation operation :
+         {Operation::sample_normal, Operation::sample_reflection, Operation::evaluate_and_pdf, Operation::masking})
+      cases.push_back({.operation = operation,
+                       .model = {.distribution = distribution},
+                       .sampler = Sampler::visible,
+                       .moments = true});
   return cases;
 }
 
@@ -158,7 +251,8 @@ absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera
                                     const std::function<void(const VerifiedBatch&)>& progress) {
   const auto cases = verify_cases(options.samplers);
   Verification verification;
-  for (std::size_t k = 0; k < options.batches; ++k) {
+  const std::size_t batches = options.batches > 0 ? options.batches : cases.size();
+  for (std::size_t k = 0; k < batches; ++k) {
     const VerifyCase& what = cases[k % cases.size()];
     Inputs inputs;
     inputs.lanes = camera.trace(options.lanes);

@@ -16,13 +16,16 @@ namespace facetwise::app {
 // One batch of the comparison.
 struct VerifyCase {
   Operation operation;
+  Model model{};
   Sampler sampler = Sampler::exact;
-  Shadowing shadowing = Shadowing::correlated;
   bool generator = true;  // the random numbers: the generator's, or columns
+  bool moments = false;   // mean slopes and correlated roughness too
 };
 
-// What the batches are, in turn: reflections by every sampler, by the generator and by columns of random
-// numbers, then normals, queries and masking. Never empty for a list of samplers that is not.
+// What the batches are, in turn. Of GGX with Smith masking: reflections by every sampler, by the generator and by
+// columns of random numbers, then normals, queries and masking. Then of every other distribution and masking that
+// has one of the samplers: reflections, normals, queries, and what a dielectric transmits. Never empty for a list
+// of samplers that is not.
 std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers);
 
 struct VerifiedBatch {
@@ -43,7 +46,7 @@ struct Verification {
 };
 
 struct VerifyOptions {
-  std::size_t batches = 16;
+  std::size_t batches = 0;                   // 0: each of verify_cases() once
   std::size_t lanes = std::size_t{1} << 20;  // per batch
   std::vector<Sampler> samplers;
   std::uint64_t seed = 1;

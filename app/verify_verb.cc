@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #if defined(__SSE2__)
 #include <immintrin.h>
 #endif
@@ -13,6 +14,7 @@
 #include "app/table/output_file.h"
 #include "app/verbs.h"
 #include "app/verify.h"
+#include "facetwise/bench.h"
 
 namespace facetwise::app {
 namespace {
@@ -36,13 +38,23 @@ double millions(std::uint64_t lanes, double seconds) {
   return seconds > 0 ? 1e-6 * static_cast<double>(lanes) / seconds : 0.0;
 }
 
+// "exact", "beckmann-smith/exact": as in the benchmarks' names.
+std::string sampler_name(const VerifyCase& what) {
+  return bench_name(name(what.model.distribution), name(what.model.masking), name(what.sampler));
+}
+
 std::string shown(const VerifyCase& what) {
   std::string text(name(what.operation));
-  const bool samples =
-      what.operation == Operation::sample_reflection || what.operation == Operation::sample_normal;
+  const bool samples = text.starts_with("sample_");
   if (what.operation != Operation::masking && what.operation != Operation::evaluate_reflection)
-    text += fmt::format(" {}", name(what.sampler));
-  if (what.shadowing != Shadowing::correlated) text += fmt::format(" {}", name(what.shadowing));
+    text += fmt::format(" {}", sampler_name(what));
+  else if (const std::string model = model_name(name(what.model.distribution), name(what.model.masking));
+           !model.empty())
+    text += " " + model;
+  if (what.model.shadowing != Shadowing::correlated) text += fmt::format(" {}", name(what.model.shadowing));
+  if (what.model.interface != Interface::conductor) text += fmt::format(" {}", name(what.model.interface));
+  if (what.model.retro) text += " retro";
+  if (what.moments) text += " moments";
   if (samples) text += what.generator ? " by seed" : " by columns";
   return text;
 }
@@ -53,7 +65,8 @@ struct Totals {
   struct Count {
     std::uint64_t samples = 0, occluded = 0;
   };
-  std::map<Sampler, Count> reflections;
+  // By distribution, masking and sampler, in the enumerations' order.
+  std::map<std::tuple<Distribution, Masking, Sampler>, Count> reflections;
 
   explicit Totals(const Verification& verification) {
     for (const VerifiedBatch& batch : verification.batches) {
@@ -63,8 +76,12 @@ struct Totals {
       remote_seconds += batch.remote_seconds;
       local_seconds += batch.local_seconds;
       if (batch.what.operation != Operation::sample_reflection) continue;
-      reflections[batch.what.sampler].samples += batch.statistics.lanes();
-      reflections[batch.what.sampler].occluded += batch.statistics.occluded;
+      // Retro-reflection and mean slopes have shares of their own.
+      if (batch.what.model.retro || batch.what.moments) continue;
+      Count& count =
+          reflections[{batch.what.model.distribution, batch.what.model.masking, batch.what.sampler}];
+      count.samples += batch.statistics.lanes();
+      count.occluded += batch.statistics.occluded;
     }
   }
 };
@@ -76,9 +93,12 @@ void print(const Verification& verification, const std::string& mesh) {
              percent(verification.hits, verification.rays));
   fmt::print("lanes       {} in {} batches, {} backfacing ({:.1f} %)\n", totals.lanes,
              verification.batches.size(), totals.backfacing, percent(totals.backfacing, totals.lanes));
-  for (const auto& [sampler, count] : totals.reflections)
-    fmt::print("occluded    {:<8} {:>9} of {} reflections ({:.2f} %)\n", name(sampler), count.occluded,
-               count.samples, percent(count.occluded, count.samples));
+  for (const auto& [what, count] : totals.reflections) {
+    const auto& [distribution, masking, sampler] = what;
+    fmt::print("occluded    {:<26} {:>9} of {} reflections ({:.2f} %)\n",
+               bench_name(name(distribution), name(masking), name(sampler)), count.occluded, count.samples,
+               percent(count.occluded, count.samples));
+  }
   fmt::print("throughput  remote {:.1f}, local {:.0f} million lanes/s, all outputs\n",
              millions(totals.lanes, totals.remote_seconds), millions(totals.lanes, totals.local_seconds));
   if (verification.equal())
@@ -103,13 +123,25 @@ Json to_json(const Verification& verification, const std::string& mesh, const En
                {"local_lanes_per_second", 1e6 * millions(totals.lanes, totals.local_seconds)},
                {"reflections", Json::array()},
                {"batches", Json::array()}};
-  for (const auto& [sampler, count] : totals.reflections)
-    json["reflections"].push_back(
-        {{"sampler", name(sampler)}, {"samples", count.samples}, {"occluded", count.occluded}});
+  for (const auto& [what, count] : totals.reflections) {
+    const auto& [distribution, masking, sampler] = what;
+    json["reflections"].push_back({{"distribution", name(distribution)},
+                                   {"masking", name(masking)},
+                                   {"sampler", name(sampler)},
+                                   {"samples", count.samples},
+                                   {"occluded", count.occluded}});
+  }
   for (const VerifiedBatch& batch : verification.batches)
     json["batches"].push_back({{"operation", name(batch.what.operation)},
+                               {"distribution", name(batch.what.model.distribution)},
+                               {"masking", name(batch.what.model.masking)},
                                {"sampler", name(batch.what.sampler)},
-                               {"shadowing", name(batch.what.shadowing)},
+                               {"shadowing", name(batch.what.model.shadowing)},
+                               {"normalisation", name(batch.what.model.normalisation)},
+                               {"interface", name(batch.what.model.interface)},
+                               {"transport", name(batch.what.model.transport)},
+                               {"retro", batch.what.model.retro},
+                               {"moments", batch.what.moments},
                                {"random", batch.what.generator ? "seed" : "columns"},
                                {"lanes", batch.statistics.lanes()},
                                {"accepted", batch.statistics.accepted},
@@ -142,10 +174,11 @@ struct VerifyVerb {
     auto remote = engine.open();
     if (!remote.ok()) return fail("verify", remote.status());
     const auto local = local_engine();
+    if (options.batches == 0) options.batches = verify_cases(options.samplers).size();
     std::size_t done = 0;
     const auto verification = verify(**remote, *local, **camera, options, [&](const VerifiedBatch& batch) {
       const Statistics& s = batch.statistics;
-      fmt::print(stderr, "[{:>2}/{}] {:<38} {} lanes, {:5.2f} % occluded, remote {:5.1f} M/s: {}\n", ++done,
+      fmt::print(stderr, "[{:>2}/{}] {:<64} {} lanes, {:5.2f} % occluded, remote {:5.1f} M/s: {}\n", ++done,
                  options.batches, shown(batch.what), s.lanes(), percent(s.occluded, s.lanes()),
                  millions(s.lanes(), batch.remote_seconds),
                  batch.difference.empty() ? "equal" : batch.difference);
@@ -172,8 +205,9 @@ Verb add_verify(CLI::App& app) {
   command.footer(
       R"(Rays are traced from a fixed camera at a mesh; what they hit, with normals bent by a procedural
 normal map and roughness that varies over the mesh, is sent batch by batch, and every answer is
-recomputed here. The first batches sample reflections by each sampler, the others normals, densities,
-values and masking, in turn. Exit code 1 if a byte differs.
+recomputed here. The first batches sample GGX's reflections by each sampler, the others normals, densities,
+values and masking, and then the same of each distribution and masking, and what dielectrics transmit. Exit
+code 1 if a byte differs.
 
 Examples:
   facetwise verify --remote unix:/tmp/facetwise.sock
@@ -184,7 +218,7 @@ Examples:
       .add_option("--mesh", arguments->mesh,
                   "Any format that assimp reads; default 2CylinderEngine.glb of assimp-testmodels")
       ->type_name("FILE");
-  command.add_option("--batches", arguments->options.batches, "Batches to send; default 16")
+  command.add_option("--batches", arguments->options.batches, "Batches to send; default one of each kind")
       ->check(CLI::PositiveNumber)
       ->option_text("N");
   command.add_option("--lanes", arguments->options.lanes, "Lanes in a batch; default 1048576")

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "facetwise/baseline.h"
 
 namespace facetwise::bench {
 namespace {
@@ -18,6 +19,23 @@ constexpr Implementation kImplementations[] = {Implementation::scalar, Implement
                                                Implementation::simd, Implementation::simd_threads,
                                                Implementation::remote};
 constexpr Sampler kReflectionSamplers[] = {Sampler::bounded, Sampler::exact};
+// GGX's with Smith masking: `visible` is `cap`.
+constexpr Sampler kGgxSamplers[] = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact};
+
+// The other models, in the order of their results.
+constexpr std::pair<Distribution, Masking> kModels[] = {
+    {Distribution::beckmann, Masking::smith},   {Distribution::student_t, Masking::smith},
+    {Distribution::ggx, Masking::vcavity},      {Distribution::beckmann, Masking::vcavity},
+    {Distribution::student_t, Masking::vcavity}, {Distribution::phong, Masking::vcavity}};
+
+bool has_baseline(const Case& which) {
+  if (which.inputs == Inputs::generator) return false;  // it takes its random numbers from columns alone
+  if (which.scatters()) return false;
+  const baseline::Model model{which.distribution, which.masking};
+  if (which.sampler) return baseline::has_baseline(model, *which.sampler);
+  return baseline::has_baseline(model, Sampler::ndf) &&
+         (which.operation != Operation::masking || which.masking == Masking::smith);
+}
 
 class List {
  public:
@@ -25,8 +43,7 @@ class List {
   void add(Case which) {
     for (const Implementation implementation : kImplementations) {
       which.implementation = implementation;
-      // The baseline takes its random numbers from columns alone.
-      if (implementation == Implementation::scalar && which.inputs == Inputs::generator) continue;
+      if (implementation == Implementation::scalar && !has_baseline(which)) continue;
       cases_.push_back(which);
     }
   }
@@ -51,18 +68,49 @@ std::vector<Case> operations(std::span<const Sampler> query_samplers,
   return cases;
 }
 
+// Every operation of the other models with every sampler that fits, and scattering of all.
+std::vector<Case> model_cases() {
+  std::vector<Case> cases;
+  const auto add = [&](Operation operation, Distribution distribution, Masking masking) {
+    const Case which{.operation = operation, .distribution = distribution, .masking = masking, .sampler = std::nullopt};
+    const auto samplers = samplers_for(operation, which.model());
+    if (operation == Operation::evaluate_reflection || operation == Operation::masking) cases.push_back(which);
+    for (const Sampler sampler : samplers) {
+      if (which.is_ggx_smith() && sampler == Sampler::visible) continue;
+      cases.push_back(which);
+      cases.back().sampler = sampler;
+    }
+  };
+  for (const auto& [distribution, masking] : kModels)
+    for (const Operation operation : all_operations()) add(operation, distribution, masking);
+  for (const Operation operation : all_operations())
+    if (operation >= Operation::sample_transmission) add(operation, Distribution::ggx, Masking::smith);
+  return cases;
+}
+
+// What shows the other models: reflections by visible normals, and by those that are not occluded.
+void add_shown_models(List& list, float alpha_x, float alpha_y) {
+  for (Case which : model_cases()) {
+    if (which.operation != Operation::sample_reflection || which.sampler == Sampler::ndf) continue;
+    which.alpha_x = alpha_x;
+    which.alpha_y = alpha_y;
+    list.add(which);
+  }
+}
+
 std::vector<Case> quick_cases() {
   List list;
-  for (const Sampler sampler : all_samplers()) list.add({.sampler = sampler});
+  for (const Sampler sampler : kGgxSamplers) list.add({.sampler = sampler});
   for (const Sampler sampler : kReflectionSamplers)
     list.add({.sampler = sampler, .alpha_x = 0.8f, .alpha_y = 0.1f});
+  add_shown_models(list, 0.3f, 0.3f);
   return list.take();
 }
 
 std::vector<Case> standard_cases() {
   List list;
   for (int k = 0; k < 2; ++k)
-    for (const Sampler sampler : all_samplers())
+    for (const Sampler sampler : kGgxSamplers)
       list.add({.sampler = sampler, .alpha_x = kAlphas[k].first, .alpha_y = kAlphas[k].second});
   for (const Sampler sampler : kReflectionSamplers)
     for (const std::size_t batch : kBatches)
@@ -71,6 +119,13 @@ std::vector<Case> standard_cases() {
     for (const Sampler sampler : kReflectionSamplers) list.add({.sampler = sampler, .inputs = inputs});
   constexpr Sampler kNormals[] = {Sampler::cap};
   for (const Case& which : operations(kReflectionSamplers, kNormals)) list.add(which);
+  for (int k = 0; k < 2; ++k) add_shown_models(list, kAlphas[k].first, kAlphas[k].second);
+  // Of the rest, what a path tracer calls with visible normals.
+  for (const Case& which : model_cases()) {
+    const bool called = which.operation == Operation::sample_scattering ||
+                        (which.operation == Operation::evaluate_and_pdf && which.masking == Masking::smith);
+    if (called && (which.sampler == Sampler::visible || which.sampler == Sampler::cap)) list.add(which);
+  }
   return list.take();
 }
 
@@ -81,10 +136,10 @@ std::vector<Case> all_cases() {
     for (const auto& [alpha_x, alpha_y] : kAlphas) {
       for (const Inputs inputs :
            {Inputs::columns, Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
-        for (const Sampler sampler : all_samplers())
+        for (const Sampler sampler : kGgxSamplers)
           list.add(
               {.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
-      for (Case which : operations(all_samplers(), kNormals)) {
+      for (Case which : operations(kGgxSamplers, kNormals)) {
         which.alpha_x = alpha_x;
         which.alpha_y = alpha_y;
         which.batch = batch;
@@ -92,6 +147,12 @@ std::vector<Case> all_cases() {
       }
     }
   }
+  for (const auto& [alpha_x, alpha_y] : kAlphas)
+    for (Case which : model_cases()) {
+      which.alpha_x = alpha_x;
+      which.alpha_y = alpha_y;
+      list.add(which);
+    }
   return list.take();
 }
 
@@ -140,17 +201,20 @@ int Case::input_columns() const {
 
 int Case::output_columns() const {
   if (is_sampling()) return 4;  // a direction and its pdf
-  return operation == Operation::evaluate_and_pdf ? 2 : 1;
+  return operation == Operation::evaluate_and_pdf || scatters() ? 2 : 1;
 }
 
 bool Case::comparable(const Case& other) const {
-  return operation == other.operation && sampler == other.sampler && alpha_x == other.alpha_x &&
+  return operation == other.operation && distribution == other.distribution && masking == other.masking &&
+         sampler == other.sampler && alpha_x == other.alpha_x &&
          alpha_y == other.alpha_y && batch == other.batch && inputs == other.inputs;
 }
 
 BenchResult describe(const Case& which) {
   BenchResult result;
   result.operation = which.operation;
+  result.distribution = std::string(facetwise::name(which.distribution));
+  result.masking = std::string(facetwise::name(which.masking));
   result.sampler = which.sampler ? std::string(facetwise::name(*which.sampler)) : "none";
   // As the decimal that was written, not as the nearest float.
   const auto decimal = [](float value) {
@@ -193,6 +257,7 @@ absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options) {
 }
 
 int flops(const Case& which) {
+  if (!which.is_ggx_smith() || which.scatters()) return 0;
   const bool isotropic = which.alpha_x == which.alpha_y;
   constexpr int kLength = 6, kPrepare = 9, kSinCos = 19, kReflect = 8, kBound = 20, kShadowing = 17;
   const int cone = isotropic ? 28 : 80;
@@ -207,6 +272,7 @@ int flops(const Case& which) {
         draw = 56;
         break;
       case Sampler::cap:
+      case Sampler::visible:
         draw = 31;
         break;
       case Sampler::bounded:
@@ -229,6 +295,7 @@ int flops(const Case& which) {
         break;
       case Sampler::heitz:
       case Sampler::cap:
+      case Sampler::visible:
         sum += 2;
         break;
       case Sampler::bounded:

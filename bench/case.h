@@ -20,6 +20,8 @@ std::string_view name(Inputs);
 
 struct Case {
   Operation operation = Operation::sample_reflection;
+  Distribution distribution = Distribution::ggx;
+  Masking masking = Masking::smith;
   std::optional<Sampler> sampler;  // nothing where the operation has no use for one
   float alpha_x = 0.3f, alpha_y = 0.3f;
   std::size_t batch = 65536;
@@ -27,9 +29,20 @@ struct Case {
   Inputs inputs = Inputs::columns;
 
   bool is_sampling() const {
-    return operation == Operation::sample_reflection || operation == Operation::sample_normal;
+    return operation == Operation::sample_reflection || operation == Operation::sample_normal ||
+           operation == Operation::sample_transmission || operation == Operation::sample_scattering;
   }
-  bool uses_u3() const { return sampler && is_sampling() && facetwise::uses_u3(*sampler); }
+  // Of a dielectric; the others' interface is a conductor.
+  bool scatters() const { return operation >= Operation::sample_transmission; }
+  bool is_ggx_smith() const { return distribution == Distribution::ggx && masking == Masking::smith; }
+  Model model() const {
+    return {.distribution = distribution,
+            .masking = masking,
+            .interface = scatters() ? Interface::dielectric : Interface::conductor};
+  }
+  bool uses_u3() const {
+    return is_sampling() && (operation == Operation::sample_scattering || facetwise::uses_u3(model(), *sampler));
+  }
   // Float columns with a value per lane that are read, and that are written.
   int input_columns() const;
   int output_columns() const;
@@ -46,7 +59,7 @@ absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options);
 
 // Floating-point operations of a lane with i_z > 0 that ends up accepted, counted by hand from the kernels'
 // formulas: + - * / and sqrt are one, a fused multiply-add two; comparisons, selects, integers (random
-// numbers) and conversions are none.
+// numbers) and conversions are none. 0 where nobody has counted: models besides GGX with Smith, and scattering.
 int flops(const Case& which);
 
 }  // namespace facetwise::bench

@@ -60,22 +60,38 @@ absl::StatusOr<Columns> Columns::make(std::size_t lanes) {
   return columns;
 }
 
-absl::Status Columns::set_roughness(float alpha_x, float alpha_y, std::size_t lanes, bool queries) {
+void Columns::set_roughness(float alpha_x, float alpha_y, std::size_t lanes) {
   if (alpha_x != alpha_x_ || alpha_y != alpha_y_) rough_lanes_ = query_lanes_ = 0;
   alpha_x_ = alpha_x;
   alpha_y_ = alpha_y;
-  if (rough_lanes_ < lanes) {
-    std::fill_n(input(kAlphaX), lanes, alpha_x);
-    std::fill_n(input(kAlphaY), lanes, alpha_y);
-    rough_lanes_ = lanes;
-  }
-  if (queries && query_lanes_ < lanes) {
-    Batch sampling = batch({.sampler = Sampler::cap, .batch = lanes});
-    sampling.out = {};
-    sampling.out.outgoing = {{input(kOx), lanes}, {input(kOy), lanes}, {input(kOz), lanes}};
-    if (auto sampled = sample_reflection(sampling); !sampled.ok()) return sampled.status();
-    query_lanes_ = lanes;
-  }
+  if (rough_lanes_ >= lanes) return;
+  std::fill_n(input(kAlphaX), lanes, alpha_x);
+  std::fill_n(input(kAlphaY), lanes, alpha_y);
+  rough_lanes_ = lanes;
+}
+
+absl::Status Columns::prepare(const Case& which) {
+  set_roughness(which.alpha_x, which.alpha_y, which.batch);
+  if (which.is_sampling() || which.operation == Operation::masking) return absl::OkStatus();
+  const std::size_t lanes = which.batch;
+  const Case drawing{.operation = which.operation == Operation::evaluate_transmission ? Operation::sample_transmission
+                                  : which.operation == Operation::evaluate_scattering ? Operation::sample_scattering
+                                                                                      : Operation::sample_reflection,
+                     .distribution = which.distribution,
+                     .masking = which.masking,
+                     .sampler = Sampler::visible,
+                     .alpha_x = which.alpha_x,
+                     .alpha_y = which.alpha_y,
+                     .batch = lanes};
+  Case drawn = query_;
+  drawn.batch = lanes;
+  if (drawing.comparable(drawn) && query_lanes_ >= lanes) return absl::OkStatus();
+  Batch sampling = batch(drawing);
+  sampling.out = {};
+  sampling.out.outgoing = {{input(kOx), lanes}, {input(kOy), lanes}, {input(kOz), lanes}};
+  if (auto sampled = run(drawing.operation, sampling); !sampled.ok()) return sampled.status();
+  query_ = drawing;
+  query_lanes_ = lanes;
   return absl::OkStatus();
 }
 
@@ -94,6 +110,8 @@ Batch Columns::batch(const Case& which) const {
   const auto out = [&](int index) { return OutputColumn<float>(output(index), lanes); };
   Batch batch;
   batch.lanes = lanes;
+  batch.model = which.model();
+  if (which.scatters()) batch.eta = 1.5f;
   if (which.sampler) batch.sampler = *which.sampler;
   batch.incident = {in(kIx), in(kIy), in(which.inputs == Inputs::backfacing ? kIzBackfacing : kIz)};
   if (which.inputs == Inputs::one_roughness) {
@@ -120,6 +138,8 @@ Batch Columns::batch(const Case& which) const {
       batch.out.pdf = out(3);
       break;
     case Operation::sample_reflection:
+    case Operation::sample_transmission:
+    case Operation::sample_scattering:
       batch.out.outgoing = {out(0), out(1), out(2)};
       batch.out.pdf = out(3);
       break;
@@ -130,6 +150,8 @@ Batch Columns::batch(const Case& which) const {
       batch.out.value = out(0);
       break;
     case Operation::evaluate_and_pdf:
+    case Operation::evaluate_transmission:
+    case Operation::evaluate_scattering:
       batch.out.value = out(0);
       batch.out.pdf = out(1);
       break;

@@ -19,9 +19,11 @@ class Columns {
   static absl::StatusOr<Columns> make(std::size_t lanes);
 
   std::size_t lanes() const { return lanes_; }
-  // Roughness of the first `lanes` lanes; queries' outgoing directions are drawn for it (by `cap`, occluded
-  // ones included).
-  absl::Status set_roughness(float alpha_x, float alpha_y, std::size_t lanes, bool queries);
+  // Roughness of the first `lanes` lanes.
+  void set_roughness(float alpha_x, float alpha_y, std::size_t lanes);
+  // The case's roughness and, for a query, outgoing directions drawn for it: by its model's visible normals,
+  // occluded ones included.
+  absl::Status prepare(const Case& which);
   // Roughness that differs from lane to lane, evenly spread over [0.05, 1]².
   void set_mixed_roughness(std::size_t lanes);
 
@@ -43,9 +45,10 @@ class Columns {
   };
   std::size_t lanes_ = 0, stride_ = 0;  // stride in floats
   std::unique_ptr<float[], Free> data_;
-  // What set_roughness() has set: of how many lanes, and how many have queries' directions.
+  // What set_roughness() has set: of how many lanes, and how many have queries' directions, drawn how.
   float alpha_x_ = 0, alpha_y_ = 0;
   std::size_t rough_lanes_ = 0, query_lanes_ = 0;
+  Case query_{};
 };
 
 }  // namespace facetwise::bench

@@ -16,8 +16,8 @@ Json finite(double value) { return std::isfinite(value) ? Json(value) : Json(nul
 Json to_json(const BenchResult& r) {
   Json json = {
       {"operation", text(name(r.operation))},
-      {"distribution", text(name(Distribution::ggx))},
-      {"masking", text(name(Masking::smith))},
+      {"distribution", r.distribution},
+      {"masking", r.masking},
       {"sampler", r.sampler},
       {"alpha", {r.alpha_x, r.alpha_y}},
       {"implementation", r.implementation},
@@ -43,6 +43,8 @@ Json to_json(const BenchResult& r) {
 
 Json to_json(const RejectionResult& r) {
   return {{"experiment", r.experiment},
+          {"distribution", r.distribution},
+          {"masking", r.masking},
           {"sampler", r.sampler},
           {"theta_degrees", r.theta_degrees},
           {"alpha", {r.alpha_x, r.alpha_y}},

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "facetwise/reference.h"
 
@@ -13,11 +14,12 @@ constexpr double kPi = std::numbers::pi;
 reference::Vector incident(double theta) { return {std::sin(theta), 0, std::cos(theta)}; }
 
 // One configuration's count. `stream` sets its random numbers apart from the others'.
-absl::Status count(const std::string& experiment, Sampler sampler, double alpha_x, double alpha_y,
-                   double theta, std::size_t samples, std::uint32_t stream, Target target,
+absl::Status count(const std::string& experiment, const Model& model, Sampler sampler, double alpha_x,
+                   double alpha_y, double theta, std::size_t samples, std::uint32_t stream, Target target,
                    std::vector<RejectionResult>& results) {
   const reference::Vector i = incident(theta);
   Batch batch;
+  batch.model = model;
   batch.sampler = sampler;
   batch.lanes = samples;
   batch.incident = {static_cast<float>(i.x), static_cast<float>(i.y), static_cast<float>(i.z)};
@@ -30,13 +32,15 @@ absl::Status count(const std::string& experiment, Sampler sampler, double alpha_
   if (!statistics.ok()) return statistics.status();
   RejectionResult result;
   result.experiment = experiment;
+  result.distribution = std::string(name(model.distribution));
+  result.masking = std::string(name(model.masking));
   result.sampler = std::string(name(sampler));
   result.theta_degrees = theta * 180 / kPi;
   result.alpha_x = alpha_x;
   result.alpha_y = alpha_y;
   result.samples = samples;
   result.rejected = statistics->occluded;
-  result.predicted_share = predicted_share(sampler, alpha_x, alpha_y, theta);
+  result.predicted_share = predicted_share(model, sampler, alpha_x, alpha_y, theta);
   results.push_back(result);
   return absl::OkStatus();
 }
@@ -58,9 +62,27 @@ struct Post {
 constexpr Post kPost[] = {{.046, 1900}, {1.26, 730}};
 constexpr double kPostTheta[] = {1.5, kPi / 4};
 
+// The other models, each at the table's configurations and one behind the surface.
+struct Composition {
+  Distribution distribution;
+  Masking masking;
+};
+constexpr Composition kModels[] = {{Distribution::beckmann, Masking::smith},
+                                   {Distribution::ggx, Masking::vcavity},
+                                   {Distribution::beckmann, Masking::vcavity}};
+constexpr Configuration kBehind = {100, .5, .5};
+// GGX's `visible` is `cap`.
+constexpr Sampler kGgxSamplers[] = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact};
+constexpr Sampler kModelSamplers[] = {Sampler::ndf, Sampler::visible, Sampler::exact};
+
+// Share of the normals of density D(m) m_z whose stretched slope is longer than t.
+double share_beyond(Distribution distribution, double t) {
+  return distribution == Distribution::beckmann ? std::exp(-t * t) : 1 / (1 + t * t);
+}
+
 }  // namespace
 
-double ndf_share_occluded(double alpha_x, double alpha_y, double theta) {
+double ndf_share_occluded(double alpha_x, double alpha_y, double theta, Distribution distribution) {
   const reference::Vector i = incident(theta);
   // Enough for a peak as narrow as an anisotropy of 100 makes it.
   constexpr int kPoints = 1 << 16;
@@ -76,11 +98,11 @@ double ndf_share_occluded(double alpha_x, double alpha_y, double theta) {
       const double a = i.z * (ex * ex + ey * ey);
       const double root = std::sqrt(b * b + a * i.z);
       const double t = b > 0 ? (b + root) / a : i.z / (root - b);
-      accepted += 1 / (1 + 1 / (t * t));
+      accepted += 1 - share_beyond(distribution, t);
     } else if (b > 0) {
       // i.M > 0 where t > -i_z / b; o_z = 2 (i.M) m_z - i_z > 0 follows.
       const double t = -i.z / b;
-      accepted += 1 / (1 + t * t);
+      accepted += share_beyond(distribution, t);
     }
   }
   return 1 - accepted / kPoints;
@@ -99,17 +121,28 @@ double predicted_share(Sampler sampler, double alpha_x, double alpha_y, double t
   return std::max(0.0, 1 - k / sigma_b);  // at normal incidence 1 - 1, to rounding
 }
 
+double predicted_share(const Model& model, Sampler sampler, double alpha_x, double alpha_y, double theta) {
+  if (model.distribution == Distribution::ggx && model.masking == Masking::smith)
+    return predicted_share(sampler, alpha_x, alpha_y, theta);
+  if (sampler == Sampler::ndf) return ndf_share_occluded(alpha_x, alpha_y, theta, model.distribution);
+  if (sampler == Sampler::exact) return 0;
+  return 1 - reference::share_unoccluded({.model = model, .alpha = {alpha_x, alpha_y}}, incident(theta));
+}
+
 absl::Status count_rejections(std::size_t samples, Target target, const std::function<bool()>& step,
                               std::vector<RejectionResult>& results) {
   std::uint32_t stream = 0;
-  const auto all_at = [&](const char* experiment, double alpha_x, double alpha_y, double theta,
-                          std::size_t lanes) -> absl::Status {
-    for (const Sampler sampler : all_samplers())
+  const auto each = [&](const char* experiment, const Model& model, std::span<const Sampler> samplers, double alpha_x,
+                        double alpha_y, double theta, std::size_t lanes) -> absl::Status {
+    for (const Sampler sampler : samplers)
       if (const auto status =
-              count(experiment, sampler, alpha_x, alpha_y, theta, lanes, stream++, target, results);
+              count(experiment, model, sampler, alpha_x, alpha_y, theta, lanes, stream++, target, results);
           !status.ok())
         return status;
     return step() ? absl::OkStatus() : absl::CancelledError("the benchmarks were stopped");
+  };
+  const auto all_at = [&](const char* experiment, double alpha_x, double alpha_y, double theta, std::size_t lanes) {
+    return each(experiment, {}, kGgxSamplers, alpha_x, alpha_y, theta, lanes);
   };
   for (const auto& [theta, alpha_x, alpha_y] : kTable)
     if (const auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())
@@ -121,6 +154,14 @@ absl::Status count_rejections(std::size_t samples, Target target, const std::fun
   for (const auto& [alpha, lanes] : kPost)
     for (const double theta : kPostTheta)
       if (const auto status = all_at("post-2015", alpha, alpha, theta, lanes); !status.ok()) return status;
+  std::vector<Configuration> configurations(std::begin(kTable), std::end(kTable));
+  configurations.push_back(kBehind);
+  for (const auto& [distribution, masking] : kModels)
+    for (const auto& [theta, alpha_x, alpha_y] : configurations)
+      if (const auto status = each("models", {.distribution = distribution, .masking = masking}, kModelSamplers,
+                                   alpha_x, alpha_y, theta * kPi / 180, samples);
+          !status.ok())
+        return status;
   return absl::OkStatus();
 }
 

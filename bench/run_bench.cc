@@ -122,8 +122,19 @@ double BenchResult::ns_per_accepted() const {
 }
 
 std::string BenchResult::name() const {
-  return fmt::format("{}/{}/{:g},{:g}/{}/{}{}", facetwise::name(operation), sampler, alpha_x, alpha_y, batch,
-                     implementation, inputs == "columns" ? "" : "/" + inputs);
+  return fmt::format("{}/{}/{:g},{:g}/{}/{}{}", facetwise::name(operation),
+                     bench_name(distribution, masking, sampler), alpha_x, alpha_y, batch, implementation,
+                     inputs == "columns" ? "" : "/" + inputs);
+}
+
+std::string model_name(std::string_view distribution, std::string_view masking) {
+  if (distribution == "ggx" && masking == "smith") return {};
+  return fmt::format("{}-{}", distribution, masking);
+}
+
+std::string bench_name(std::string_view distribution, std::string_view masking, std::string_view sampler) {
+  const std::string model = model_name(distribution, masking);
+  return model.empty() ? std::string(sampler) : fmt::format("{}/{}", model, sampler);
 }
 
 double RejectionResult::deviations() const {

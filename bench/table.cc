@@ -19,7 +19,8 @@ struct Row {
                     *remote = nullptr;
 
   bool takes(const BenchResult& r) const {
-    return any->operation == r.operation && any->sampler == r.sampler && any->alpha_x == r.alpha_x &&
+    return any->operation == r.operation && any->distribution == r.distribution && any->masking == r.masking &&
+           any->sampler == r.sampler && any->alpha_x == r.alpha_x &&
            any->alpha_y == r.alpha_y && any->inputs == r.inputs && any->batch == r.batch;
   }
   void set(const BenchResult& r) {
@@ -64,15 +65,15 @@ void add_results(const std::vector<BenchResult>& results, Out out) {
     const BenchResult& any = *row.any;
     if (k == 0 || rows[k - 1].any->operation != any.operation || rows[k - 1].any->inputs != any.inputs) {
       fmt::format_to(out, "\n{}{}\n", name(any.operation), any.inputs == "columns" ? "" : ", " + any.inputs);
-      fmt::format_to(out, "  {:8}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8}{:>8}{:>8}{:>7}{:>7}\n",
+      fmt::format_to(out, "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8}{:>8}{:>8}{:>7}{:>7}\n",
                      "sampler", "alpha", "batch", "scalar", "one-lane", "simd", "threads", "remote",
                      "occluded", "ns/acc.", "M/s", "GB/s", "copy", "FMA");
     }
     // The last columns are of the fastest way on one thread.
     const BenchResult* best = row.simd ? row.simd : row.any;
     fmt::format_to(out,
-                   "  {:8}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8.3g}{:>8.0f}{:>8}{:>7}{:>7}\n",
-                   any.sampler, fmt::format("{:g}, {:g}", any.alpha_x, any.alpha_y), batch_text(any.batch),
+                   "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8.3g}{:>8.0f}{:>8}{:>7}{:>7}\n",
+                   bench_name(any.distribution, any.masking, any.sampler), fmt::format("{:g}, {:g}", any.alpha_x, any.alpha_y), batch_text(any.batch),
                    time_text(row.scalar, nullptr), time_text(row.one_lane, row.scalar),
                    time_text(row.simd, row.scalar), time_text(row.threads, row.scalar),
                    time_text(row.remote, row.scalar), fmt::format("{:.2f} %", 100 * best->share_occluded()),
@@ -119,8 +120,17 @@ void add_targets(const std::vector<TargetResult>& targets, Out out) {
 
 std::string alpha_text(const RejectionResult& r) { return fmt::format("{:g}, {:g}", r.alpha_x, r.alpha_y); }
 
-// One configuration's results of all samplers stand next to each other.
-void add_configurations(const std::vector<const RejectionResult*>& results, std::size_t samplers, Out out) {
+// How many samplers each configuration was counted with: they stand next to each other.
+std::size_t samplers_of(const std::vector<const RejectionResult*>& results) {
+  const auto next = std::find_if(results.begin(), results.end(), [&](const RejectionResult* r) {
+    return r != results.front() && r->sampler == results.front()->sampler;
+  });
+  return static_cast<std::size_t>(next - results.begin());
+}
+
+void add_configurations(const std::vector<const RejectionResult*>& results, Out out) {
+  if (results.empty()) return;
+  const std::size_t samplers = samplers_of(results);
   fmt::format_to(out, "  {:>7}{:>14}{:>10}", "theta", "alpha", "samples");
   for (std::size_t k = 0; k < samplers; ++k) fmt::format_to(out, "{:>18}", results[k]->sampler);
   fmt::format_to(out, "\n");
@@ -165,9 +175,8 @@ void add_rejections(const std::vector<RejectionResult>& rejections, Out out) {
       if (r.experiment == experiment) results.push_back(&r);
     return results;
   };
-  const std::size_t samplers = all_samplers().size();
   fmt::format_to(out, "\nShare of samples occluded: counted [predicted]\n");
-  add_configurations(of("table"), samplers, out);
+  add_configurations(of("table"), out);
   fmt::format_to(out, "\nThe same over angle and roughness, counted (heitz is as cap, exact has none)\n");
   for (const Sampler sampler : {Sampler::ndf, Sampler::cap, Sampler::bounded})
     add_grid(of("sweep"), name(sampler), out);
@@ -187,7 +196,18 @@ void add_rejections(const std::vector<RejectionResult>& rejections, Out out) {
                  "\nCounts of a post of 2015 (371 with ndf, 61 with visible normals at 1.5 rad; 52 at pi/4), "
                  "for the two\n"
                  "roughnesses and numbers of samples that fit those at 1.5 rad best: counted [expected]\n");
-  add_configurations(of("post-2015"), samplers, out);
+  add_configurations(of("post-2015"), out);
+  // Models stand one after another.
+  const auto models = of("models");
+  for (auto first = models.begin(); first != models.end();) {
+    const auto last = std::find_if(first, models.end(), [&](const RejectionResult* r) {
+      return r->distribution != (*first)->distribution || r->masking != (*first)->masking;
+    });
+    fmt::format_to(out, "\nThe same of {}: counted [predicted]\n",
+                   model_name((*first)->distribution, (*first)->masking));
+    add_configurations({first, last}, out);
+    first = last;
+  }
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ class Measuring {
   }
 
   void roughness(Roughness alpha, std::size_t lanes) {
-    status_.Update(columns_.set_roughness(alpha.x, alpha.y, lanes, false));
+    columns_.set_roughness(alpha.x, alpha.y, lanes);
   }
 
   static Case sampling(Sampler sampler, Implementation implementation, std::size_t batch = kBatch) {

@@ -172,10 +172,7 @@ absl::Status measure_throughput(const BenchOptions& options, const std::vector<C
   for (auto first = cases.begin(); first != cases.end();) {
     const auto last =
         std::find_if_not(first, cases.end(), [&](const Case& which) { return which.comparable(*first); });
-    const bool queries = !first->is_sampling() && first->operation != Operation::masking;
-    if (const auto status = columns.set_roughness(first->alpha_x, first->alpha_y, first->batch, queries);
-        !status.ok())
-      return status;
+    if (const auto status = columns.prepare(*first); !status.ok()) return status;
 
     Group group(options, first->batch);
     std::vector<std::uint64_t> rejected(static_cast<std::size_t>(last - first));

@@ -114,26 +114,32 @@ class CsvInput final : public InputTable {
 
 class CsvOutput final : public OutputTable {
  public:
-  CsvOutput(std::span<const std::string> names, std::size_t rows, std::optional<OutputFile> file)
-      : names_(names.begin(), names.end()),
-        columns_(names.size(), std::vector<float>(rows)),
-        status_(rows),
+  CsvOutput(TableColumns names, std::size_t rows, std::optional<OutputFile> file)
+      : names_(std::move(names)),
+        rows_(rows),
+        columns_(names_.floats.size(), std::vector<float>(rows)),
+        bytes_(names_.bytes.size(), std::vector<std::uint8_t>(rows)),
         file_(std::move(file)) {}
 
   OutputColumn<float> column(std::size_t index) override { return OutputColumn<float>(columns_[index]); }
-  OutputColumn<std::uint8_t> status() override { return OutputColumn<std::uint8_t>(status_); }
+  OutputColumn<std::uint8_t> byte_column(std::size_t index) override {
+    return OutputColumn<std::uint8_t>(bytes_[index]);
+  }
 
   absl::Status commit() override {
     fmt::memory_buffer text;
     const auto append = [&](std::string_view piece) {
       text.append(piece.data(), piece.data() + piece.size());
     };
-    for (const auto& name : names_) append(name), append(",");
-    append("status\n");
-    for (std::size_t row = 0; row < status_.size(); ++row) {
+    const auto end_line = [&] { text[text.size() - 1] = '\n'; };  // instead of the last comma
+    for (const auto& name : names_.floats) append(name), append(",");
+    for (const auto& name : names_.bytes) append(name), append(",");
+    end_line();
+    for (std::size_t row = 0; row < rows_; ++row) {
       for (const auto& column : columns_)
         fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
-      fmt::format_to(fmt::appender(text), FMT_COMPILE("{}\n"), status_[row]);
+      for (const auto& column : bytes_) fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
+      end_line();
       if (text.size() < kPiece) continue;
       if (auto status = write({text.data(), text.size()}); !status.ok()) return status;
       text.clear();
@@ -149,9 +155,10 @@ class CsvOutput final : public OutputTable {
     return file_ ? file_->write(text) : write_all(STDOUT_FILENO, text, "standard output");
   }
 
-  std::vector<std::string> names_;
+  TableColumns names_;
+  std::size_t rows_;
   std::vector<std::vector<float>> columns_;
-  std::vector<std::uint8_t> status_;
+  std::vector<std::vector<std::uint8_t>> bytes_;
   std::optional<OutputFile> file_;
 };
 
@@ -181,8 +188,7 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_csv(const std::string& path) {
   return parse_csv(path, std::move(text));
 }
 
-absl::StatusOr<std::unique_ptr<OutputTable>> create_csv(const std::string& path,
-                                                        std::span<const std::string> columns,
+absl::StatusOr<std::unique_ptr<OutputTable>> create_csv(const std::string& path, const TableColumns& columns,
                                                         std::size_t rows) {
   std::optional<OutputFile> file;
   if (path != "-") {

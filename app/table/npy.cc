@@ -88,7 +88,7 @@ class NpyInput final : public InputTable {
   std::vector<std::vector<float>> copies_;
 };
 
-// Records are the float columns, the status byte and three bytes of padding.
+// Records are the float columns, then those of bytes, padded to four bytes.
 class NpyOutput final : public OutputTable {
  public:
   NpyOutput(OutputFile file, Mapping mapping, std::size_t data_offset, std::size_t columns, std::size_t rows)
@@ -101,8 +101,9 @@ class NpyOutput final : public OutputTable {
   OutputColumn<float> column(std::size_t index) override {
     return {reinterpret_cast<float*>(data_) + index, rows_, record_bytes(columns_)};
   }
-  OutputColumn<std::uint8_t> status() override {
-    return {reinterpret_cast<std::uint8_t*>(data_) + columns_ * sizeof(float), rows_, record_bytes(columns_)};
+  OutputColumn<std::uint8_t> byte_column(std::size_t index) override {
+    return {reinterpret_cast<std::uint8_t*>(data_) + columns_ * sizeof(float) + index, rows_,
+            record_bytes(columns_)};
   }
   absl::Status commit() override {
     mapping_.unmap();
@@ -141,12 +142,12 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_npy(const std::string& path) {
   return std::make_unique<NpyInput>(path, std::move(mapping), *std::move(header));
 }
 
-absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path,
-                                                        std::span<const std::string> columns,
+absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path, const TableColumns& columns,
                                                         std::size_t rows) {
   std::string header = "{'descr': [";
-  for (const std::string& name : columns) header += fmt::format("('{}', '<f4'), ", name);
-  header += fmt::format("('status', '|u1'), ('', '|V3')], 'fortran_order': False, 'shape': ({},), }}", rows);
+  for (const std::string& name : columns.floats) header += fmt::format("('{}', '<f4'), ", name);
+  for (const std::string& name : columns.bytes) header += fmt::format("('{}', '|u1'), ", name);
+  header += fmt::format("('', '|V{}')], 'fortran_order': False, 'shape': ({},), }}", 4 - columns.bytes.size(), rows);
   // As NumPy does it: spaces, so that the records begin at a multiple of 64, and a line end.
   constexpr std::size_t kPreamble = 10, kAlignment = 64;
   header.append(kAlignment - (kPreamble + header.size() + 1) % kAlignment, ' ').push_back('\n');
@@ -160,13 +161,13 @@ absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path,
   if (!file.ok()) return file.status();
   if (auto status = file->write(header); !status.ok()) return status;
   // Space is reserved now: a full disk is an error here, not a fault while kernels write.
-  const std::size_t size = header.size() + rows * NpyOutput::record_bytes(columns.size());
+  const std::size_t size = header.size() + rows * NpyOutput::record_bytes(columns.floats.size());
   if (const int error = ::posix_fallocate(file->descriptor(), 0, static_cast<off_t>(size)); error != 0)
     return invalid("{}: cannot reserve {} bytes: {}", path, size, std::strerror(error));
   Mapping mapping;
   if (!mapping.map(file->descriptor(), size, true)) return invalid("{}: {}", path, std::strerror(errno));
-  return std::make_unique<NpyOutput>(*std::move(file), std::move(mapping), header.size(), columns.size(),
-                                     rows);
+  return std::make_unique<NpyOutput>(*std::move(file), std::move(mapping), header.size(),
+                                     columns.floats.size(), rows);
 }
 
 }  // namespace facetwise::app

@@ -18,8 +18,7 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_table(const std::string& path) 
   return unknown_format(path);
 }
 
-absl::StatusOr<std::unique_ptr<OutputTable>> create_table(const std::string& path,
-                                                          std::span<const std::string> columns,
+absl::StatusOr<std::unique_ptr<OutputTable>> create_table(const std::string& path, const TableColumns& columns,
                                                           std::size_t rows) {
   if (path.ends_with(".npy")) return create_npy(path, columns, rows);
   if (path == "-" || path.ends_with(".csv")) return create_csv(path, columns, rows);

@@ -30,18 +30,22 @@ class OutputTable {
   virtual ~OutputTable() = default;
   // The columns, in the order in which they were named.
   virtual OutputColumn<float> column(std::size_t index) = 0;
-  // The last column, `status`: one LaneStatus a row.
-  virtual OutputColumn<std::uint8_t> status() = 0;
+  // The columns of bytes, which come after the others.
+  virtual OutputColumn<std::uint8_t> byte_column(std::size_t index) = 0;
   virtual absl::Status commit() = 0;
 };
 
 // Reads PATH: .npy, .csv, or "-" for CSV from standard input. Errors begin with the path.
 absl::StatusOr<std::unique_ptr<InputTable>> read_table(const std::string& path);
 
-// Makes a table of `rows` rows with the named float columns and then `status`, to be written to PATH as
-// read_table() would read it.
-absl::StatusOr<std::unique_ptr<OutputTable>> create_table(const std::string& path,
-                                                          std::span<const std::string> columns,
+// The columns of a table that is to be written.
+struct TableColumns {
+  std::vector<std::string> floats;
+  std::vector<std::string> bytes = {"status"};  // one to three
+};
+
+// Makes a table of `rows` rows, to be written to PATH as read_table() would read it.
+absl::StatusOr<std::unique_ptr<OutputTable>> create_table(const std::string& path, const TableColumns& columns,
                                                           std::size_t rows);
 
 }  // namespace facetwise::app

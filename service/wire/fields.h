@@ -28,8 +28,10 @@ struct OutputPlace {
   int part;
   v1::Output output;  // what asks for it
 };
-// In the order of output_fields(). `status` is not among them.
+// In the order of output_fields().
 std::span<const OutputPlace> output_places();
+// In the order of byte_fields().
+std::span<const OutputPlace> byte_places();
 
 // The library's values for the protocol's and back; nothing for a value that is unknown. The unspecified
 // ones mean what the protocol says.
@@ -37,12 +39,21 @@ std::optional<Operation> operation_from(int value);
 std::optional<Distribution> distribution_from(int value);
 std::optional<Masking> masking_from(int value);
 std::optional<Shadowing> shadowing_from(int value);
-std::optional<Sampler> sampler_from(int value, Operation operation);
+std::optional<Normalisation> normalisation_from(int value);
+std::optional<Interface> interface_from(int value);
+std::optional<Transport> transport_from(int value);
+std::optional<Sampler> sampler_from(int value, Operation operation, const Model& model);
 v1::Operation to_proto(Operation value);
 v1::Distribution to_proto(Distribution value);
 v1::Masking to_proto(Masking value);
 v1::Shadowing to_proto(Shadowing value);
+v1::Normalisation to_proto(Normalisation value);
+v1::Interface to_proto(Interface value);
+v1::Transport to_proto(Transport value);
 v1::SamplerKind to_proto(Sampler value);
+
+// What an unspecified sampler means: exact where the model has it for the operation, else visible.
+Sampler default_sampler(Operation operation, const Model& model);
 
 // Bit (1 << Output) for each output that the operation has.
 unsigned outputs_of(Operation operation);

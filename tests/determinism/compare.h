@@ -9,13 +9,6 @@
 
 namespace facetwise::test {
 
-inline bool reads(const Call& call, const InputField& field) {
-  return field.operations & bit(call.operation);
-}
-inline bool writes(const Call& call, const OutputField& field) {
-  return field.operations & bit(call.operation);
-}
-
 // Memory of an answer as make_batch() leaves it: nothing is written yet.
 Answer blank_answer(const Call& call, std::size_t lanes);
 // run(); an error fails the test.

@@ -17,7 +17,7 @@ constexpr std::size_t kLanes = kQuick ? 1200 : 9000;
 std::vector<Call> sampling_calls() {
   std::vector<Call> calls;
   for (const Call& call : all_calls())
-    if (call.operation <= Operation::sample_reflection) calls.push_back(call);
+    if (name(call.operation).starts_with("sample_")) calls.push_back(call);
   return calls;
 }
 
@@ -34,7 +34,7 @@ Answer generate(const Call& call, const Lanes& lanes, const Generator& generator
 Lanes with_numbers(Lanes lanes, const Generator& generator, const std::vector<std::uint64_t>& ids) {
   for (std::size_t lane = 0; lane < lanes.count; ++lane) {
     const auto u = generated(generator.seed, generator.dimension, ids[lane]);
-    for (std::size_t k = 0; k < 3; ++k) lanes.in[8 + k][lane] = u[k];
+    for (std::size_t k = 0; k < 3; ++k) lanes.in[input::u1 + k][lane] = u[k];
   }
   return lanes;
 }

@@ -63,36 +63,123 @@ float uniform(std::uint64_t seed, std::uint64_t index) {
   return static_cast<float>(hash(seed, index) >> 40) * 0x1p-24f;
 }
 
+bool is_plain(const Call& call) {
+  return call.model.distribution == Distribution::ggx && call.model.masking == Masking::smith &&
+         call.model.interface == Interface::conductor && call.model.normalisation == Normalisation::unbiased &&
+         !call.model.retro && !call.moments;
+}
+
+bool reads(const Call& call, const InputField& field) {
+  if (!(field.operations & bit(call.operation))) return false;
+  if (field.name == "eta") return call.model.interface == Interface::dielectric;
+  if (field.name == "f0" || field.name == "f90") return call.model.interface == Interface::schlick;
+  if (field.name == "slope_correlation") return call.moments;
+  // What Raab's back-vector does needs slopes that are symmetric about n.
+  if (field.name.starts_with("mean_slope")) return call.moments && !call.model.retro;
+  return true;
+}
+
+bool writes(const Call& call, const OutputField& field) {
+  if (field.name == "out.share_unoccluded" &&
+      (call.model.distribution != Distribution::ggx || call.model.masking != Masking::smith))
+    return false;
+  return field.operations & bit(call.operation);
+}
+
+bool writes(const Call& call, const ByteField& field) { return field.operations & bit(call.operation); }
+
 std::string call_name(const Call& call) {
-  std::string name(facetwise::name(call.operation));
-  if (call.operation != Operation::masking && call.operation != Operation::evaluate_reflection)
-    name.append("/").append(facetwise::name(call.sampler));
-  if (call.shadowing == Shadowing::uncorrelated) name.append("/uncorrelated");
-  return name;
+  std::string text(name(call.operation));
+  const auto append = [&](auto value) { text.append("/").append(name(value)); };
+  const Model& model = call.model;
+  if (model.distribution != Distribution::ggx || model.masking != Masking::smith) {
+    append(model.distribution);
+    text.append("-").append(name(model.masking));
+  }
+  if (call.operation != Operation::masking && call.operation != Operation::evaluate_reflection) append(call.sampler);
+  if (call.shadowing == Shadowing::uncorrelated) append(call.shadowing);
+  if (model.normalisation != Normalisation::unbiased) append(model.normalisation);
+  if (model.interface != Interface::conductor) append(model.interface);
+  if (model.transport != Transport::radiance) append(model.transport);
+  if (model.retro) text += "/retro";
+  if (call.moments) text += "/moments";
+  return text;
 }
 
 void PrintTo(const Call& call, std::ostream* to) { *to << call_name(call); }
 
-std::vector<Call> all_calls() {
-  std::vector<Call> calls;
+namespace {
+
+bool takes_no_sampler(Operation operation) {
+  return operation == Operation::masking || operation == Operation::evaluate_reflection;
+}
+
+// GGX with Smith masking, a conductor.
+void add_plain(std::vector<Call>& calls) {
   for (const Operation operation : all_operations()) {
-    const bool one_sampler = operation == Operation::masking || operation == Operation::evaluate_reflection;
+    if (operation >= Operation::sample_transmission) continue;
     const bool shadowed = operation == Operation::sample_reflection ||
                           operation == Operation::evaluate_reflection || operation == Operation::evaluate_and_pdf;
     for (const Sampler sampler : all_samplers()) {
-      if (one_sampler && sampler != Sampler::cap) continue;
+      if (takes_no_sampler(operation) && sampler != Sampler::cap) continue;
+      if (sampler == Sampler::visible) continue;  // `cap`
       if (operation == Operation::sample_normal && !samples_normals(sampler)) continue;
       calls.push_back({operation, sampler, Shadowing::correlated});
       if (shadowed) calls.push_back({operation, sampler, Shadowing::uncorrelated});
     }
   }
+}
+
+// What else a model can be, a little of it in each call.
+void vary(Call& call, std::size_t turn) {
+  if (turn % 3 == 1) call.shadowing = Shadowing::uncorrelated;
+  if (turn % 4 == 1) call.model.normalisation = Normalisation::biased;
+  if (turn % 4 == 2) call.model.transport = Transport::importance;
+  if (turn % 5 == 3) call.model.retro = true;
+  if (call.operation >= Operation::sample_transmission) return;
+  if (turn % 2 == 1) call.model.interface = turn % 4 == 1 ? Interface::schlick : Interface::dielectric;
+}
+
+bool fits(const Call& call) {
+  static const Lanes lanes = ordinary_lanes(1, 1);
+  Answer answer;
+  return check(call.operation, make_batch(call, lanes, answer)).ok();
+}
+
+void add_model(const Model& model, bool moments, std::vector<Call>& calls) {
+  std::size_t turn = calls.size();
+  for (const Operation operation : all_operations()) {
+    Model varied = model;
+    if (operation >= Operation::sample_transmission) varied.interface = Interface::dielectric;
+    auto samplers = samplers_for(operation, varied);
+    if (takes_no_sampler(operation)) samplers = {Sampler::visible};
+    for (const Sampler sampler : samplers) {
+      Call call{operation, sampler, Shadowing::correlated, varied, moments};
+      vary(call, ++turn);
+      if (!moments || fits(call)) calls.push_back(call);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Call> all_calls() {
+  std::vector<Call> calls;
+  add_plain(calls);
+  for (const Masking masking : {Masking::smith, Masking::vcavity})
+    for (const Distribution distribution :
+         {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong})
+      if (distribution != Distribution::phong || masking == Masking::vcavity)
+        add_model({.distribution = distribution, .masking = masking}, false, calls);
+  for (const Distribution distribution : {Distribution::ggx, Distribution::beckmann})
+    add_model({.distribution = distribution}, true, calls);
   return calls;
 }
 
 Lanes ordinary_lanes(std::size_t count, std::uint64_t seed) {
   Lanes lanes;
   lanes.count = count;
-  lanes.in.assign(input_fields().size(), std::vector<float>(count));
+  lanes.in.assign(input::count, std::vector<float>(count));
   for (std::size_t lane = 0; lane < count; ++lane) {
     const Vector i = any_direction(100 * seed + 1, lane, false), o = any_direction(100 * seed + 11, lane, true);
     const float alpha_x = any_alpha(100 * seed + 21, lane);
@@ -102,7 +189,19 @@ Lanes ordinary_lanes(std::size_t count, std::uint64_t seed) {
     const float values[] = {i.x, i.y, i.z, alpha_x, alpha_y, o.x, o.y, o.z,
                             any_u(100 * seed + 51, lane), any_u(100 * seed + 61, lane),
                             any_u(100 * seed + 71, lane)};
-    for (std::size_t k = 0; k < lanes.in.size(); ++k) lanes.in[k][lane] = values[k];
+    for (std::size_t k = 0; k < std::size(values); ++k) lanes.in[input::kPlain[k]][lane] = values[k];
+    const auto between = [&](std::uint64_t stream, float low, float high) {
+      return low + (high - low) * uniform(100 * seed + stream, lane);
+    };
+    const bool steep = hash(100 * seed + 80, lane) % 8 == 0;
+    lanes.in[input::mean_slope_x][lane] = between(81, -1, 1) * (steep ? 100.0f : 0.5f);
+    lanes.in[input::mean_slope_y][lane] = hash(100 * seed + 82, lane) % 4 == 0 ? 0.0f : between(83, -0.5f, 0.5f);
+    lanes.in[input::slope_correlation][lane] = between(84, -1, 1) * 0.999f;
+    const std::uint64_t medium = hash(100 * seed + 85, lane) % 16;
+    constexpr float kMedia[] = {1.0f, 1.5f, 1 / 1.5f, kSmallestEta, kLargestEta, 1.0000001f};
+    lanes.in[input::eta][lane] = medium < std::size(kMedia) ? kMedia[medium] : between(86, 0.4f, 2.5f);
+    lanes.in[input::f0][lane] = between(87, 0, 1);
+    lanes.in[input::f90][lane] = medium == 0 ? 0.0f : between(88, 0.5f, 1);
   }
   return lanes;
 }
@@ -115,15 +214,21 @@ Lanes adversarial_lanes(std::size_t count, std::uint64_t seed) {
   for (std::size_t lane = 0; lane < count; ++lane) {
     const std::uint64_t bits = hash(seed + 1000, lane);
     if ((lane / 128) % 2 == 0 || bits % 6 != 0) continue;
-    float& value = lanes.in[(bits >> 8) % lanes.in.size()][lane];
+    constexpr std::size_t kPlain = std::size(input::kPlain), kOthers = input::count - kPlain;
+    float& value = lanes.in[input::kPlain[(bits >> 8) % kPlain]][lane];
     value = (bits >> 16) % 4 == 0 ? std::bit_cast<float>(static_cast<std::uint32_t>(bits >> 32))
                                   : kBad[(bits >> 24) % std::size(kBad)];
+    // Columns of some models alone.
+    const std::uint64_t more = hash(seed + 2000, lane);
+    float& other = lanes.in[input::mean_slope_x + more % kOthers][lane];
+    other = (more >> 16) % 4 == 0 ? std::bit_cast<float>(static_cast<std::uint32_t>(more >> 32))
+                                  : kBad[(more >> 24) % std::size(kBad)];
   }
   return lanes;
 }
 
 bool same_bits(const Answer& a, const Answer& b) {
-  if (a.statistics != b.statistics || a.status != b.status || a.out.size() != b.out.size()) return false;
+  if (a.statistics != b.statistics || a.status != b.status || a.event != b.event || a.out.size() != b.out.size()) return false;
   for (std::size_t k = 0; k < a.out.size(); ++k) {
     if (a.out[k].size() != b.out[k].size()) return false;
     if (!a.out[k].empty() && std::memcmp(a.out[k].data(), b.out[k].data(), 4 * a.out[k].size()) != 0) return false;
@@ -136,24 +241,30 @@ std::uint64_t digest(const Answer& answer) {
   for (const auto& column : answer.out)
     for (const float value : column) digest = hash(digest, std::bit_cast<std::uint32_t>(value));
   for (const std::uint8_t status : answer.status) digest = hash(digest, status);
+  for (const std::uint8_t event : answer.event) digest = hash(digest, event);
   return digest;
 }
 
 Batch make_batch(const Call& call, const Lanes& lanes, Answer& answer) {
   Batch batch;
+  batch.model = call.model;
   batch.model.shadowing = call.shadowing;
   batch.sampler = call.sampler;
   batch.lanes = lanes.count;
   for (std::size_t k = 0; k < lanes.in.size(); ++k)
-    if (input_fields()[k].operations & bit(call.operation)) input_fields()[k].column(batch) = lanes.in[k];
+    if (reads(call, input_fields()[k])) input_fields()[k].column(batch) = lanes.in[k];
   answer.out.resize(output_fields().size());
   for (std::size_t k = 0; k < answer.out.size(); ++k) {
-    if (!(output_fields()[k].operations & bit(call.operation))) continue;
+    if (!writes(call, output_fields()[k])) continue;
     answer.out[k].assign(lanes.count, -7.0f);
     output_fields()[k].column(batch) = answer.out[k];
   }
   answer.status.assign(lanes.count, 77);
   batch.out.status = answer.status;
+  if (call.operation == Operation::sample_scattering) {
+    answer.event.assign(lanes.count, 77);
+    batch.out.event = answer.event;
+  }
   return batch;
 }
 

@@ -24,7 +24,7 @@ class Sequence {
   std::uint64_t seed_, index_ = 0;
 };
 
-// The order of input_fields().
+// The columns that every model has: input::kPlain.
 enum { kIx, kIy, kIz, kAlphaX, kAlphaY, kOx, kOy, kOz, kU1, kU2, kU3, kFields };
 
 constexpr float kBelowOne = 1.0f - 0x1p-24f;
@@ -166,12 +166,38 @@ void ordinary_lane(Sequence& next, const Block& block, float (&lane)[kFields]) {
   std::copy(std::begin(values), std::end(values), lane);
 }
 
+// The columns of some models alone.
+void other_columns(Sequence& next, Kind kind, bool exceptions, Lanes& lanes, std::size_t lane) {
+  static constexpr float kBad[] = {kNan, kInfinity, -kInfinity, 3e38f, -1.0f, 1.0f, 100.01f, -100.01f, 0.00999f};
+  const auto put = [&](input::Index index, float value) {
+    if (kind == Kind::mixed && exceptions && next.one_in(32)) value = kBad[next.below(std::size(kBad))];
+    if (kind == Kind::any_bits && next.one_in(8)) value = std::bit_cast<float>(next.bits());
+    lanes.in[index][lane] = value;
+  };
+  for (const auto index : {input::mean_slope_x, input::mean_slope_y}) {
+    const float scale = next.one_in(8) ? kLargestMeanSlope : next.one_in(4) ? 0.0f : 1.0f;
+    put(index, scale * (2 * next.uniform() - 1));
+  }
+  const float edge = next.one_in(16) ? kBelowOne : next.one_in(4) ? 0.0f : 0.99f;
+  put(input::slope_correlation, edge * (2 * next.uniform() - 1));
+  const float media[] = {1.0f, kSmallestEta, kLargestEta, 1.5f, 0.75f, 1 + 0x1p-20f};
+  const bool chosen = next.one_in(3);
+  const std::uint32_t medium = next.below(std::size(media));
+  const float eta = 0.4f + 2 * next.uniform();
+  put(input::eta, chosen ? media[medium] : eta);
+  for (const auto index : {input::f0, input::f90}) {
+    const bool end = next.one_in(8);
+    const float f = next.uniform();
+    put(index, end ? static_cast<float>(next.below(2)) : f);
+  }
+}
+
 }  // namespace
 
 Lanes hard_lanes(Kind kind, std::size_t count, std::uint64_t seed) {
   Lanes lanes;
   lanes.count = count;
-  lanes.in.assign(kFields, std::vector<float>(count));
+  lanes.in.assign(input::count, std::vector<float>(count));
   for (std::size_t lane = 0; lane < count; ++lane) {
     const Block block(Sequence(2 * seed, lane / 64));
     Sequence next(2 * seed + 1, lane);
@@ -185,7 +211,9 @@ Lanes hard_lanes(Kind kind, std::size_t count, std::uint64_t seed) {
         if (chosen >> k & 1) values[k] = std::bit_cast<float>(next.bits());
       if (style == 7) ordinary_lane(next, block, values);
     }
-    for (int k = 0; k < kFields; ++k) lanes.in[static_cast<std::size_t>(k)][lane] = values[k];
+    for (int k = 0; k < kFields; ++k) lanes.in[input::kPlain[k]][lane] = values[k];
+    Sequence others(hash(2 * seed + 1, lane), 1);
+    other_columns(others, kind, block.exceptions, lanes, lane);
   }
   return lanes;
 }

@@ -17,7 +17,7 @@ namespace facetwise {
 
 enum class BenchSuite {
   standard,  // what shows the headline: at most 3 minutes
-  quick,     // the same at 64 k lanes only, fewer operations: about 40 seconds
+  quick,     // the same at 64 k lanes only, fewer operations: about 50 seconds
   full,      // every operation, sampler, implementation, batch and roughness: about an hour
 };
 
@@ -47,6 +47,7 @@ struct BenchOptions {
 // One benchmark's result. `samples` lanes were timed again and again, of which `rejected` are occluded.
 struct BenchResult {
   Operation operation{};
+  std::string distribution = "ggx", masking = "smith";
   std::string sampler;  // "none" where the operation has no use for one
   double alpha_x = 0, alpha_y = 0;
   std::string implementation;  // "scalar" | "one-lane" | "simd" | "simd-threads" | "remote"
@@ -68,14 +69,21 @@ struct BenchResult {
   double samples_per_second() const { return 1e9 / ns_per_sample; }
   double bytes_per_second() const { return bytes_per_sample * samples_per_second(); }
   double share_occluded() const { return static_cast<double>(rejected) / static_cast<double>(samples); }
-  // "operation/sampler/alpha_x,alpha_y/batch/implementation", and "/inputs" unless they are "columns".
+  // "operation/sampler/alpha_x,alpha_y/batch/implementation", and "/inputs" unless they are "columns". The sampler
+  // of other models than GGX with Smith is as bench_name() says.
   std::string name() const;
 };
+
+// "" for ggx with smith, else "beckmann-smith".
+std::string model_name(std::string_view distribution, std::string_view masking);
+// "exact", "beckmann-smith/exact": a sampler in the names of results.
+std::string bench_name(std::string_view distribution, std::string_view masking, std::string_view sampler);
 
 // Rejections of one sampler at one configuration, azimuth 0. Counted through the kernels, and predicted by a
 // closed form (cap, heitz, bounded, exact) or by quadrature (ndf).
 struct RejectionResult {
-  std::string experiment;  // "table" | "sweep" | "post-2015"
+  std::string experiment;  // "table" | "sweep" | "post-2015" | "models"
+  std::string distribution = "ggx", masking = "smith";
   std::string sampler;
   double theta_degrees = 0;  // of i
   double alpha_x = 0, alpha_y = 0;

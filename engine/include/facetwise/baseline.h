@@ -28,6 +28,23 @@ inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, 
 inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
 inline float masking(Vector i, float alpha_x, float alpha_y);
 
+// Of any of these models (has_baseline()): GGX with Smith masking as above; Beckmann with Smith by `ndf` and `visible`
+// (slope inversion by Newton's method: Heitz & d'Eon 2014, Jakob 2014); Student-t with Smith by `ndf`; V-cavity with
+// these three, by `ndf` and `visible` (flipping: Heitz & d'Eon 2014), for i_z > 0 alone.
+struct Model {
+  Distribution distribution = Distribution::ggx;
+  Masking masking = Masking::smith;
+};
+constexpr bool has_baseline(Model model, Sampler sampler);
+inline Sample sample_normal(Model model, Sampler sampler, Vector i, float alpha_x, float alpha_y, float u1, float u2,
+                            float u3);
+inline Sample sample_reflection(Model model, Sampler sampler, Shadowing shadowing, Vector i, float alpha_x,
+                                float alpha_y, float u1, float u2, float u3);
+inline float pdf_reflection(Model model, Sampler sampler, Vector i, Vector o, float alpha_x, float alpha_y);
+inline float evaluate_reflection(Model model, Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
+inline float masking(Model model, Vector i, float alpha_x, float alpha_y);  // Smith
+
 }  // namespace facetwise::baseline
 
-#include "facetwise/baseline_inl.h"  // IWYU pragma: export
+#include "facetwise/baseline_inl.h"         // IWYU pragma: export
+#include "facetwise/baseline_models_inl.h"  // IWYU pragma: export

@@ -20,9 +20,11 @@ absl::Status bad_answer(absl::string_view what) {
 }
 
 unsigned wanted_outputs(Batch& batch) {
-  unsigned outputs = batch.out.status.present() ? 1u << v1::STATUS : 0;
+  unsigned outputs = 0;
   for (std::size_t k = 0; k < wire::output_places().size(); ++k)
     if (output_fields()[k].column(batch).present()) outputs |= 1u << wire::output_places()[k].output;
+  for (std::size_t k = 0; k < wire::byte_places().size(); ++k)
+    if (byte_fields()[k].column(batch).present()) outputs |= 1u << wire::byte_places()[k].output;
   return outputs;
 }
 
@@ -33,7 +35,8 @@ std::size_t most_lanes(Batch& batch, bool sends_ids, unsigned outputs, const Pie
       request += sizeof(float);
   for (const auto& place : wire::output_places())
     if (outputs & (1u << place.output)) response += sizeof(float);
-  if (outputs & (1u << v1::STATUS)) ++response;
+  for (const auto& place : wire::byte_places())
+    if (outputs & (1u << place.output)) ++response;
   return limits.lanes(request, response);
 }
 
@@ -60,9 +63,14 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
   Batch batch = batch_;
   v1::BatchRequest small;
   small.set_operation(wire::to_proto(operation_));
-  small.mutable_model()->set_distribution(wire::to_proto(batch.model.distribution));
-  small.mutable_model()->set_masking(wire::to_proto(batch.model.masking));
-  small.mutable_model()->set_shadowing(wire::to_proto(batch.model.shadowing));
+  v1::Model& model = *small.mutable_model();
+  model.set_distribution(wire::to_proto(batch.model.distribution));
+  model.set_masking(wire::to_proto(batch.model.masking));
+  model.set_shadowing(wire::to_proto(batch.model.shadowing));
+  model.set_normalisation(wire::to_proto(batch.model.normalisation));
+  model.set_interface(wire::to_proto(batch.model.interface));
+  model.set_transport(wire::to_proto(batch.model.transport));
+  model.set_retro(batch.model.retro);
   small.set_sampler(wire::to_proto(batch.sampler));
   small.set_lanes(range.size());
   for (int output = v1::Output_MIN; output <= v1::Output_MAX; ++output)
@@ -118,13 +126,14 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
   using Response = v1::BatchResponse;
   const Range range = split_.range(piece);
   MessageReader reader(response);
-  unsigned missing = 0;  // bits of output_places(), and one above for the status
+  unsigned missing = 0;  // bits of output_places(), and above them of byte_places()
   const auto places = wire::output_places();
   const auto fields = output_fields();
-  const unsigned status_bit = 1u << places.size();
+  const auto byte_places = wire::byte_places();
   for (std::size_t k = 0; k < places.size(); ++k)
     if (fields[k].column(batch_).present()) missing |= 1u << k;
-  if (batch_.out.status.present()) missing |= status_bit;
+  for (std::size_t k = 0; k < byte_places.size(); ++k)
+    if (byte_fields()[k].column(batch_).present()) missing |= 1u << (places.size() + k);
 
   // Reads a column, or passes over one that was not asked for (y of a direction whose x alone was).
   const auto read_column = [&](const MessageReader::Field& field, int number, int part) {
@@ -136,6 +145,15 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
       std::size_t bytes = 0;
       return reader.length(field, bytes) && bytes == range.size() * sizeof(float) &&
              scatter(reader, column, positions_, range);
+    }
+    for (std::size_t k = 0; k < byte_places.size(); ++k) {
+      if (byte_places[k].field != number || byte_places[k].part != part) continue;
+      const unsigned wanted = 1u << (places.size() + k);
+      if (!(missing & wanted)) break;
+      missing &= ~wanted;
+      std::size_t bytes = 0;
+      return reader.length(field, bytes) && bytes == range.size() &&
+             scatter(reader, byte_fields()[k].column(batch_), positions_, range);
     }
     return reader.skip(field);
   };
@@ -162,15 +180,6 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
             if (!read_column(*part, field->number, part->number)) return false;
           return true;
         });
-        break;
-      case Response::kStatusFieldNumber:
-        if (!(missing & status_bit)) {
-          good = reader.skip(*field);
-          break;
-        }
-        missing &= ~status_bit;
-        good = reader.length(*field, bytes) && bytes == range.size() &&
-               scatter(reader, batch_.out.status, positions_, range);
         break;
       default:
         good = read_column(*field, field->number, 0);

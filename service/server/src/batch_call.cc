@@ -19,7 +19,7 @@ using wire::MessageReader;
 using Request = v1::BatchRequest;
 
 constexpr std::size_t kAlignment = 64;
-constexpr std::size_t kInputs = 11;
+constexpr std::size_t kInputs = 17;
 
 absl::string_view view(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -45,6 +45,7 @@ class Decoder {
  private:
   absl::Status read_field(const MessageReader::Field& field);
   absl::Status read_model(std::size_t bytes);
+  absl::Status read_slope_table(const MessageReader::Field& field);
   absl::Status read_direction(int field, std::size_t bytes);
   absl::Status read_generator(std::size_t bytes);
   absl::Status read_outputs(const MessageReader::Field& field);
@@ -62,7 +63,9 @@ class Decoder {
   wire::Block block_;
   std::size_t at_ = 0;
 
-  int operation_value_ = 0, distribution_ = 0, masking_ = 0, shadowing_ = 0, sampler_ = 0;
+  int operation_value_ = 0, sampler_ = 0;
+  int distribution_ = 0, masking_ = 0, shadowing_ = 0, normalisation_ = 0, interface_ = 0, transport_ = 0;
+  bool retro_ = false;
   std::optional<Operation> operation_;
   std::uint64_t lanes_ = 0;
   unsigned outputs_ = 0;
@@ -138,10 +141,31 @@ absl::Status Decoder::read_model(std::size_t bytes) {
         return read_enum(field, masking_);
       case v1::Model::kShadowingFieldNumber:
         return read_enum(field, shadowing_);
+      case v1::Model::kNormalisationFieldNumber:
+        return read_enum(field, normalisation_);
+      case v1::Model::kInterfaceFieldNumber:
+        return read_enum(field, interface_);
+      case v1::Model::kTransportFieldNumber:
+        return read_enum(field, transport_);
+      case v1::Model::kRetroFieldNumber: {
+        std::uint64_t value = 0;
+        const bool good = reader_.varint(field, value);
+        retro_ = value != 0;
+        return good ? absl::OkStatus() : damaged_message();
+      }
+      case v1::Model::kSlopeTableFieldNumber:
+        return read_slope_table(field);
       default:
         return reader_.skip(field) ? absl::OkStatus() : damaged_message();
     }
   });
+}
+
+absl::Status Decoder::read_slope_table(const MessageReader::Field& field) {
+  std::size_t bytes = 0;
+  if (!reader_.length(field, bytes)) return damaged_message();
+  if (bytes > 0) return invalid_field("model.slope_table", "this server takes no tables");
+  return absl::OkStatus();
 }
 
 absl::Status Decoder::read_direction(int direction, std::size_t bytes) {
@@ -220,6 +244,12 @@ absl::Status Decoder::read_column(absl::string_view name, std::size_t width,
   return absl::OkStatus();
 }
 
+// False for the columns of other interfaces than the model's.
+bool interface_reads(const Model& model, std::string_view field) {
+  if (field == "eta") return model.interface == Interface::dielectric;
+  return field != "f0" || model.interface == Interface::schlick;
+}
+
 // The wire's own checks; the rest is for the engine's.
 absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
   const auto unknown = [](absl::string_view field, int value) {
@@ -231,10 +261,23 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
   const auto distribution = wire::distribution_from(distribution_);
   const auto masking = wire::masking_from(masking_);
   const auto shadowing = wire::shadowing_from(shadowing_);
-  const auto sampler = wire::sampler_from(sampler_, *operation_);
+  const auto normalisation = wire::normalisation_from(normalisation_);
+  const auto interface = wire::interface_from(interface_);
+  const auto transport = wire::transport_from(transport_);
   if (!distribution) return unknown("model.distribution", distribution_);
   if (!masking) return unknown("model.masking", masking_);
   if (!shadowing) return unknown("model.shadowing", shadowing_);
+  if (!normalisation) return unknown("model.normalisation", normalisation_);
+  if (!interface) return unknown("model.interface", interface_);
+  if (!transport) return unknown("model.transport", transport_);
+  batch.model = {.distribution = *distribution,
+                 .masking = *masking,
+                 .shadowing = *shadowing,
+                 .normalisation = *normalisation,
+                 .interface = *interface,
+                 .transport = *transport,
+                 .retro = retro_};
+  const auto sampler = wire::sampler_from(sampler_, *operation_, batch.model);
   if (!sampler) return unknown("sampler", sampler_);
   if (auto status = check_lanes(lanes_, limits); !status.ok()) return status;
   if (const unsigned strange = outputs_ & ~wire::outputs_of(*operation_); strange != 0) {
@@ -243,16 +286,17 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
         "outputs", absl::StrCat(view(name(*operation_)), " does not compute ", v1::Output_Name(output)));
   }
 
-  batch.model = {*distribution, *masking, *shadowing};
   batch.sampler = *sampler;
   batch.lanes = lanes_;
-  // An empty column is an absent one, except in an empty batch, whose columns are all empty.
+  // An empty column is an absent one, except in an empty batch, whose columns are all empty: there it is absent
+  // if the call can do without it.
   static constexpr std::uint64_t kNothing = 0;
   const auto fields = input_fields();
   for (std::size_t k = 0; k < fields.size(); ++k) {
     const Bytes& column = inputs_[k];
     const bool random = fields[k].name.front() == 'u';
-    const bool expected = (fields[k].operations & bit(*operation_)) && !(random && has_generator_);
+    const bool expected = (fields[k].operations & bit(*operation_)) && !fields[k].otherwise &&
+                          !(random && has_generator_) && interface_reads(batch.model, fields[k].name);
     if (column.size > 0)
       fields[k].column(batch) = {reinterpret_cast<const float*>(column.data), column.size / 4};
     else if (lanes_ == 0 && expected)
@@ -272,15 +316,18 @@ class Response {
   Response(unsigned outputs, std::size_t lanes) : outputs_(outputs), lanes_(lanes) {}
 
   std::size_t bytes() const {
-    std::size_t bytes = asks_for(v1::STATUS) ? lanes_ : 0;
+    std::size_t bytes = 0;
     for (const auto& place : wire::output_places())
       if (asks_for(place.output)) bytes += lanes_ * 4;
+    for (const auto& place : wire::byte_places())
+      if (asks_for(place.output)) bytes += lanes_;
     return bytes;
   }
 
   wire::MessageWriter make(Batch& batch) const {
-    wire::MessageWriter writer(kMostColumns, bytes(), kStatisticsBytes, true);
     const auto places = wire::output_places();
+    const auto byte_places = wire::byte_places();
+    wire::MessageWriter writer(places.size() + byte_places.size(), bytes(), kStatisticsBytes, true);
     for (std::size_t k = 0; k < places.size(); ++k) {
       if (!asks_for(places[k].output)) continue;
       const int part = places[k].part;
@@ -288,15 +335,15 @@ class Response {
       char* column = writer.column(part == 0 ? places[k].field : part, lanes_ * 4);
       output_fields()[k].column(batch) = {reinterpret_cast<float*>(column), lanes_};
     }
-    if (asks_for(v1::STATUS)) {
-      char* column = writer.column(v1::BatchResponse::kStatusFieldNumber, lanes_);
-      batch.out.status = {reinterpret_cast<std::uint8_t*>(column), lanes_};
+    for (std::size_t k = 0; k < byte_places.size(); ++k) {
+      if (!asks_for(byte_places[k].output)) continue;
+      char* column = writer.column(byte_places[k].field, lanes_);
+      byte_fields()[k].column(batch) = {reinterpret_cast<std::uint8_t*>(column), lanes_};
     }
     return writer;
   }
 
  private:
-  static constexpr std::size_t kMostColumns = 14;
   static constexpr std::size_t kStatisticsBytes = 64;
   bool asks_for(v1::Output output) const { return outputs_ & (1u << output); }
 
