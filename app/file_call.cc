@@ -161,7 +161,7 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
 
   TableColumns names{.floats = {}, .bytes = {}};
   for (const FileColumn& column : kOutputColumns)
-    if (field_named(output_fields(), column.field).operations & bit(call.operation))
+    if (computes(call.operation, call.model, field_named(output_fields(), column.field)))
       names.floats.emplace_back(column.name);
   for (const FileColumn& column : kByteColumns)
     if (field_named(byte_fields(), column.field).operations & bit(call.operation))
@@ -171,7 +171,7 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   std::size_t index = 0;
   for (const FileColumn& column : kOutputColumns) {
     const OutputField& field = field_named(output_fields(), column.field);
-    if (field.operations & bit(call.operation)) field.column(batch) = (*output)->column(index++);
+    if (computes(call.operation, call.model, field)) field.column(batch) = (*output)->column(index++);
   }
   index = 0;
   for (const FileColumn& column : kByteColumns) {

@@ -27,7 +27,7 @@ absl::StatusOr<Answer> ask(Engine& engine, Operation operation, Batch batch, std
   Answer answer;
   for (const OutputField& field : output_fields()) {
     auto& column = answer.columns.emplace_back();
-    if (!(field.operations & bit(operation))) continue;
+    if (!computes(operation, batch.model, field)) continue;
     column.assign(batch.lanes, std::bit_cast<float>(fill));
     field.column(batch) = OutputColumn<float>(column);
   }

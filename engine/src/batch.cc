@@ -93,7 +93,8 @@ void make_plan(Operation operation, const Batch& batch, const KernelTable& table
   plan.tile.biased = model.normalisation == Normalisation::biased && operation != Operation::masking;
   plan.tile.importance = model.transport == Transport::importance;
   plan.tile.retro = model.retro;
-  plan.tile.interface = model.interface;
+  // Operations without reflectances do not read its columns.
+  if (input_fields()[kEta].operations & bit(operation)) plan.tile.interface = model.interface;
   plan.tile.table = model.table ? &model.table->view() : nullptr;
 }
 

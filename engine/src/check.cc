@@ -133,6 +133,9 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
     const absl::string_view field = view(fields[k].name);
     if (!(fields[k].operations & bit(operation)))
       return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
+    if (!computes(operation, batch.model, fields[k]))
+      return invalid(field, k == kOutShare ? "known in closed form for ggx with smith masking only"
+                                           : "depends on the normal with vcavity masking");
     if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
   }
   for (std::size_t k = 0; k < kByteOutputs; ++k) {
@@ -143,9 +146,6 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
       return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
     if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
   }
-  const bool ggx_smith = batch.model.distribution == Distribution::ggx && batch.model.masking == Masking::smith;
-  if (columns.out[kOutShare]->present() && !ggx_smith)
-    return invalid("out.share_unoccluded", "known in closed form for ggx with smith masking only");
   return absl::OkStatus();
 }
 

@@ -89,6 +89,14 @@ Kernel find_kernel(const KernelTable& table, Operation operation, const Model& m
   return nullptr;
 }
 
+bool computes(Operation operation, const Model& model, const OutputField& field) {
+  if (!(field.operations & bit(operation))) return false;
+  if (&field == &output_fields()[kOutShare])
+    return model.distribution == Distribution::ggx && model.masking == Masking::smith;
+  if (&field == &output_fields()[kOutMasking]) return model.masking == Masking::smith;
+  return true;
+}
+
 std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
   return samplers_for(operation, model, false);
 }

@@ -74,7 +74,7 @@ TEST(Errors, NpyFiles) {
 
 TEST(Errors, Calls) {
   expect_failure({"sample", "--normals", "--sampler", "bounded", "--seed", "1", "--alpha", "1"},
-                 "ix,iy,iz\n0,0,1\n", "sampler: bounded samples reflections only");
+                 "ix,iy,iz\n0,0,1\n", "sampler: bounded does not fit sample_normal");
 }
 
 TEST(Errors, Servers) {

@@ -66,7 +66,7 @@ Batch Lanes::batch(Operation operation, Sampler sampler) const {
   if (operation == Operation::sample_normal || operation == Operation::sample_reflection) {
     batch.u1 = columns[5];
     batch.u2 = columns[6];
-    if (uses_u3(sampler)) batch.u3 = columns[7];
+    if (uses_u3({}, sampler)) batch.u3 = columns[7];
   } else if (operation != Operation::masking) {
     batch.outgoing = {columns[8], columns[9], columns[10]};
   }

@@ -72,12 +72,12 @@ TEST(Csv, WritingAndReadingGivesTheSameBits) {
     do value = std::bit_cast<float>(static_cast<std::uint32_t>(random()));
     while (std::isnan(value));
   }
-  const std::string names[] = {"pdf"};
+  const app::TableColumns names{.floats = {"pdf"}};
   auto output = create_table(path, names, kRows);
   ASSERT_TRUE(output.ok()) << output.status();
   for (std::size_t k = 0; k < kRows; ++k) {
     (*output)->column(0)[k] = values[k];
-    (*output)->status()[k] = static_cast<std::uint8_t>(k % 4);
+    (*output)->byte_column(0)[k] = static_cast<std::uint8_t>(k % 4);
   }
   ASSERT_TRUE((*output)->commit().ok());
   const auto input = read_table(path);
@@ -92,7 +92,7 @@ TEST(Csv, WritingAndReadingGivesTheSameBits) {
 
 TEST(Output, AppearsOnCommitAndLeavesNothingWithoutIt) {
   const Directory directory;
-  const std::string names[] = {"pdf"};
+  const app::TableColumns names{.floats = {"pdf"}};
   for (const char* name : {"t.csv", "t.npy"}) {
     const std::string path = directory.path(name);
     write_file(path, "old");
@@ -112,7 +112,7 @@ TEST(Output, AppearsOnCommitAndLeavesNothingWithoutIt) {
 
 TEST(Output, FollowsLinksAndRefusesWhatIsNoFile) {
   const Directory directory;
-  const std::string names[] = {"pdf"};
+  const app::TableColumns names{.floats = {"pdf"}};
   write_file(directory.path("real.csv"), "old");
   std::filesystem::create_symlink("real.csv", directory.path("link.csv"));
   const auto table = create_table(directory.path("link.csv"), names, 1);
@@ -221,14 +221,14 @@ TEST(Npy, MalformedFilesAreErrors) {
 TEST(Npy, WhatIsWrittenIsRead) {
   const Directory directory;
   const std::string path = directory.path("t.npy");
-  const std::string names[] = {"pdf", "weight"};
+  const app::TableColumns names{.floats = {"pdf", "weight"}};
   for (const std::size_t rows : {0, 1, 1000}) {
     auto output = create_table(path, names, rows);
     ASSERT_TRUE(output.ok()) << output.status();
     for (std::size_t row = 0; row < rows; ++row) {
       (*output)->column(0)[row] = 0.5f + static_cast<float>(row);
       (*output)->column(1)[row] = -static_cast<float>(row);
-      (*output)->status()[row] = 3;
+      (*output)->byte_column(0)[row] = 3;
     }
     ASSERT_TRUE((*output)->commit().ok());
     const auto input = read_table(path);

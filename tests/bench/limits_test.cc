@@ -41,7 +41,7 @@ TEST(Fma, WiderTargetsReachMore) {
 TEST(Copy, ReadsAndWritesTheColumns) {
   auto columns = Columns::make(4096);
   ASSERT_TRUE(columns.ok());
-  ASSERT_TRUE(columns->set_roughness(0.3f, 0.2f, 4096, false).ok());
+  columns->set_roughness(0.3f, 0.2f, 4096);
   for (const CopyOrder order : {CopyOrder::one_by_one, CopyOrder::side_by_side})
     for (const bool threads : {false, true})
       for (const auto& [inputs, outputs] : std::vector<std::pair<int, int>>{{7, 4}, {8, 4}, {8, 1}, {6, 3}})

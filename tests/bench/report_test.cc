@@ -100,7 +100,7 @@ BenchReport written_report() {
   for (const Sampler sampler : all_samplers())
     for (const char* experiment : {"table", "sweep", "post-2015"})
       report.rejections.push_back(
-          {experiment, std::string(name(sampler)), 30, 0.5, 0.5, 1000000, 195000, 0.1951});
+          {experiment, "ggx", "smith", std::string(name(sampler)), 30, 0.5, 0.5, 1000000, 195000, 0.1951});
   report.limits.copy = {{7, 4, 65536, 1, 1.0}, {7, 4, 65536, 4, 0.5}};
   report.limits.fma = {{Target::avx2, 1, 1e11}};
   report.targets = {{"fast", 13, true, 14.5, "x", "a note"},

@@ -19,16 +19,22 @@ void expect_round_trip(std::initializer_list<T> values, std::optional<T> (*parse
 }
 
 TEST(Names, RoundTrip) {
-  expect_round_trip({Distribution::ggx}, parse_distribution);
-  expect_round_trip({Masking::smith}, parse_masking);
+  expect_round_trip({Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong,
+                     Distribution::table},
+                    parse_distribution);
+  expect_round_trip({Masking::smith, Masking::vcavity}, parse_masking);
   expect_round_trip({Shadowing::correlated, Shadowing::uncorrelated}, parse_shadowing);
-  expect_round_trip({Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact},
+  expect_round_trip({Normalisation::unbiased, Normalisation::biased}, parse_normalisation);
+  expect_round_trip({Interface::conductor, Interface::schlick, Interface::dielectric}, parse_interface);
+  expect_round_trip({Transport::radiance, Transport::importance}, parse_transport);
+  expect_round_trip({Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact, Sampler::visible},
                     parse_sampler);
   expect_round_trip({Target::best, Target::scalar, Target::avx2, Target::avx3, Target::neon}, parse_target);
   expect_round_trip({Operation::sample_normal, Operation::sample_reflection, Operation::pdf_reflection,
-                     Operation::evaluate_reflection, Operation::evaluate_and_pdf, Operation::masking},
+                     Operation::evaluate_reflection, Operation::evaluate_and_pdf, Operation::masking,
+                     Operation::sample_transmission, Operation::evaluate_transmission, Operation::sample_scattering,
+                     Operation::evaluate_scattering},
                     parse_operation);
-  EXPECT_EQ(parse_sampler("visible"), Sampler::cap);
   EXPECT_EQ(name(Sampler::cap), "cap");
   EXPECT_EQ(name(LaneStatus::accepted), "accepted");
   EXPECT_EQ(name(LaneStatus::invalid), "invalid");
@@ -56,8 +62,9 @@ TEST(Names, FieldTables) {
     EXPECT_EQ(field.name.substr(0, 4), "out.");
     EXPECT_NE(field.operations, 0u);
   }
-  EXPECT_EQ(input_fields().size(), 11u);
-  EXPECT_EQ(output_fields().size(), 13u);
+  EXPECT_EQ(input_fields().size(), 17u);
+  EXPECT_EQ(output_fields().size(), 15u);
+  EXPECT_EQ(byte_fields().size(), 2u);
 }
 
 }  // namespace

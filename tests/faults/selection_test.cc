@@ -4,14 +4,14 @@
 namespace facetwise::test {
 namespace {
 
-constexpr Call kSample{Operation::sample_reflection, Sampler::exact, Shadowing::correlated};
+const Call kSample{Operation::sample_reflection, Sampler::exact, Shadowing::correlated};
 
 bool samples(const Call& call) {
   return call.operation == Operation::sample_normal || call.operation == Operation::sample_reflection;
 }
 
 TEST(Selection, UnknownValues) {
-  for (const Call& call : all_calls())
+  for (const Call& call : plain_calls())
     for (const int value : {200, 255}) {
       MalformedCall distribution(call), masking(call), shadowing(call), sampler(call);
       distribution.batch.model.distribution = static_cast<Distribution>(value);
@@ -70,7 +70,7 @@ TEST(Selection, ReflectionSamplersDoNotSampleNormals) {
 }
 
 TEST(Selection, GeneratorWhereItDoesNotBelong) {
-  for (const Call& call : all_calls()) {
+  for (const Call& call : plain_calls()) {
     MalformedCall spoilt(call);
     spoilt.batch.generator = Generator{};
     spoilt.refused("generator");  // not read at all, or given together with u1, u2, u3
@@ -89,7 +89,7 @@ TEST(Selection, GeneratorWhereItDoesNotBelong) {
 }
 
 TEST(Selection, NoRandomNumbersAtAll) {
-  for (const Call& call : all_calls()) {
+  for (const Call& call : plain_calls()) {
     if (!samples(call)) continue;
     MalformedCall spoilt(call);
     spoilt.batch.u1 = spoilt.batch.u2 = spoilt.batch.u3 = {};
@@ -126,7 +126,7 @@ TEST(Selection, IdsThatAreWrong) {
 
 TEST(Selection, ActiveLists) {
   constexpr std::uint32_t kLanes = MalformedCall::kLanes;
-  for (const Call& call : all_calls()) {
+  for (const Call& call : plain_calls()) {
     for (const std::uint32_t index : {kLanes, kLanes + 1, 0x7FFFFFFFu, ~0u})
       for (const std::size_t place : {0u, 1u, 2u}) {
         std::vector<std::uint32_t> active = {0, 5, 3};
@@ -158,12 +158,12 @@ TEST(Selection, ActiveLists) {
 
 // No lanes: columns may be empty, null or of one value, and the checks are made all the same.
 TEST(Selection, NoLanes) {
-  for (const Call& call : all_calls()) {
+  for (const Call& call : plain_calls()) {
     Batch batch;
     batch.model.shadowing = call.shadowing;
     batch.sampler = call.sampler;
     for (const InputField& field : input_fields())
-      if (field.operations & bit(call.operation)) field.column(batch) = Column<float>(nullptr, 0);
+      if (reads(call, field)) field.column(batch) = Column<float>(nullptr, 0);
     for (const OutputField& field : output_fields())
       if (field.operations & bit(call.operation)) field.column(batch) = OutputColumn<float>(nullptr, 0);
     batch.out.status = OutputColumn<std::uint8_t>(nullptr, 0);
@@ -173,12 +173,13 @@ TEST(Selection, NoLanes) {
 
     Batch one_value = batch;
     for (const InputField& field : input_fields())
-      if (field.operations & bit(call.operation)) field.column(one_value) = 0.5f;
+      if (reads(call, field)) field.column(one_value) = 0.5f;
     EXPECT_TRUE(run(call.operation, one_value).ok());
     one_value.active = std::span<const std::uint32_t>();
     EXPECT_TRUE(run(call.operation, one_value).ok());
 
     for (const InputField& field : input_fields()) {
+      if (!reads(call, field) && (field.operations & bit(call.operation))) continue;  // optional
       Batch spoilt = batch;
       field.column(spoilt) = field.operations & bit(call.operation) ? Column<float>() : Column<float>(0.5f);
       if (field.name == "u3" && (field.operations & bit(call.operation)) && !uses_u3({}, call.sampler)) continue;

@@ -159,7 +159,7 @@ TEST_F(MalformedCall, EveryChoice) {
     r.set_operation(v1::SAMPLE_NORMAL);
     r.clear_u3();
   });
-  expect_run_error("sampler: exact samples reflections only", [](auto& r) {
+  expect_run_error("sampler: exact does not fit sample_normal", [](auto& r) {
     r.set_operation(v1::SAMPLE_NORMAL);
     r.set_sampler(v1::EXACT);
     r.clear_outputs();

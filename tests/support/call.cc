@@ -1,5 +1,6 @@
 #include "support/call.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -80,10 +81,7 @@ bool reads(const Call& call, const InputField& field) {
 }
 
 bool writes(const Call& call, const OutputField& field) {
-  if (field.name == "out.share_unoccluded" &&
-      (call.model.distribution != Distribution::ggx || call.model.masking != Masking::smith))
-    return false;
-  return field.operations & bit(call.operation);
+  return computes(call.operation, call.model, field);
 }
 
 bool writes(const Call& call, const ByteField& field) { return field.operations & bit(call.operation); }
@@ -156,12 +154,20 @@ void add_model(const Model& model, bool moments, std::vector<Call>& calls) {
     for (const Sampler sampler : samplers) {
       Call call{operation, sampler, Shadowing::correlated, varied, moments};
       vary(call, ++turn);
+      const auto same = [&](const Call& other) { return call_name(other) == call_name(call); };
+      if (std::any_of(calls.begin(), calls.end(), same)) continue;  // plain GGX
       if (!moments || fits(call)) calls.push_back(call);
     }
   }
 }
 
 }  // namespace
+
+std::vector<Call> plain_calls() {
+  std::vector<Call> calls;
+  add_plain(calls);
+  return calls;
+}
 
 std::vector<Call> all_calls() {
   std::vector<Call> calls;

@@ -29,7 +29,8 @@ void PrintTo(const Call& call, std::ostream* to);  // for GoogleTest
 // Every operation of GGX with Smith masking, with every sampler and shadowing that changes its answer; then of every
 // model with every sampler that fits, where what else a model can be goes round with them.
 std::vector<Call> all_calls();
-// GGX with Smith masking that reflects all.
+// Those of GGX with Smith masking that reflects all.
+std::vector<Call> plain_calls();
 bool is_plain(const Call& call);
 
 // Whether the call reads and writes these columns.

@@ -151,6 +151,9 @@ struct ByteField {
   unsigned operations;
 };
 std::span<const ByteField> byte_fields();
+// Whether an operation computes a field for a model: share_unoccluded is known for GGX with Smith alone, and
+// V-cavity's masking depends on m.
+bool computes(Operation, const Model&, const OutputField&);
 constexpr unsigned bit(Operation operation) { return 1u << static_cast<unsigned>(operation); }
 
 }  // namespace facetwise

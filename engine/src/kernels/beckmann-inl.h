@@ -97,7 +97,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     const V one = Set(d, 1.0f);
     const V k = c / Max(s, Set(d, 1e-15f));
     V t;
-    VisibleSlope(d, i.all_front, k, u1, x, t);
+    VisibleSlope(d, k, u1, x, t);
     gap = Select(k > one, Max(NegFma(s, x, c), Zero(d)), s * t);
     y = NormalSlope(d, u2, one - u2);
   }
@@ -107,9 +107,8 @@ struct Beckmann : SlopeDistribution<Beckmann> {
   //   (1/2) e^(-X^2) (tail(X) + t erfcx(X)) for x < 0,   k - (1/2) e^(-X^2) (t erfcx(X) - tail(X)) for x > 0,
   // and in all k + (1/2) e^(-k^2) tail(k), for k < 0 (1/2) e^(-k^2) tail(-k), by which e^(-X^2) is then divided
   // before it is formed: k^2 - X^2 = -t (t - 2 k). Of x and t the smaller is kept to all digits: x for k > 1. Three Halley steps; error of the share 1e-6.
-  // `all_front`: k > 0 in all lanes.
   template <class D, class V = Vec<D>>
-  static HWY_NOINLINE void VisibleSlope(D d, bool all_front, V k, V u, V& x, V& t) {
+  static HWY_NOINLINE void VisibleSlope(D d, V k, V u, V& x, V& t) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
     u = Max(u, Set(d, 0x1p-26f));
     const V rest = one - u;
@@ -119,6 +118,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     V erfcx, tail;
     ErfcxAndTail(d, abs_k, erfcx, tail);
     const auto front = k > zero;
+    const bool all_front = AllTrue(d, front);  // of k, which may be 0 where w_z is not
 
     // The start. In front: the share of all slopes that are below x is u for k = infinity, and fitted for k -> 0.
     V inverse_total;
@@ -212,7 +212,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     const V at3 = fall * Fma(two * k, erfcx3, tail3) / tail;
     const V u = Fma(u1, one - at3, at3);
     V visible, gap;
-    VisibleSlope(d, false, Neg(k), Min(u, Set(d, 1.0f - 0x1p-24f)), visible, gap);
+    VisibleSlope(d, Neg(k), Min(u, Set(d, 1.0f - 0x1p-24f)), visible, gap);
     gap = Min(gap, two * k);
     const V along = Select(first, first_x, Neg(k + gap));
     const V across = NormalSlope(d, u2, one - u2);

@@ -150,7 +150,7 @@ struct BeckmannExact {
     const Ellipse<D> ellipse(d, i);
     V x, t, from, to;
     const V u = Fma(u1, ellipse.fb - ellipse.fa, ellipse.fa);
-    Beckmann::VisibleSlope(d, true, ellipse.k, Min(u, Set(d, 1.0f - 0x1p-24f)), x, t);
+    Beckmann::VisibleSlope(d, ellipse.k, Min(u, Set(d, 1.0f - 0x1p-24f)), x, t);
     x = Min(Max(x, ellipse.xa), ellipse.xb);
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);
