@@ -95,12 +95,12 @@ TEST(VerifyVerb, ComparesWithAServer) {
   const auto json = nlohmann::json::parse(read_file(path));
   EXPECT_EQ(json["equal"], true);
   EXPECT_EQ(json["triangles"], 121496);
-  EXPECT_EQ(json["lanes"], 16 * 30000);
+  EXPECT_EQ(json["lanes"], json["batches"].size() * 30000);
   EXPECT_GE(json["hits"].get<double>(), 0.5 * json["rays"].get<double>());
   const double backfacing = json["backfacing"].get<double>() / json["lanes"].get<double>();
   EXPECT_GT(backfacing, 0.02);
   EXPECT_LT(backfacing, 0.30);
-  ASSERT_EQ(json["batches"].size(), 16u);
+  ASSERT_GT(json["batches"].size(), 100u);
   ASSERT_EQ(json["reflections"].size(), 5u);
   // In the samplers' order, from the most rejections to none.
   std::vector<std::uint64_t> occluded;

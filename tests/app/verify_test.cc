@@ -69,8 +69,9 @@ Verification verify_with(LyingEngine::Lie lie, std::size_t wrong) {
 TEST(Verify, NothingWrong) {
   const auto verification = verify_with(LyingEngine::Lie::none, 0);
   EXPECT_TRUE(verification.equal());
-  EXPECT_EQ(verification.batches.size(), 16u);
-  EXPECT_EQ(verification.lanes(), 16 * kLanes);
+  const std::size_t cases = verify_cases(samplers()).size();
+  EXPECT_EQ(verification.batches.size(), cases);
+  EXPECT_EQ(verification.lanes(), cases * kLanes);
   for (const auto& batch : verification.batches) EXPECT_EQ(batch.statistics.invalid, 0u);
 }
 
@@ -80,7 +81,7 @@ TEST(Verify, FindsEveryLieInItsBatch) {
     for (std::size_t wrong = 0; wrong < 16; ++wrong) {
       const auto verification = verify_with(lie, wrong);
       EXPECT_FALSE(verification.equal());
-      for (std::size_t k = 0; k < 16; ++k)
+      for (std::size_t k = 0; k < verification.batches.size(); ++k)
         EXPECT_EQ(verification.batches[k].difference.empty(), k != wrong)
             << "lie " << static_cast<int>(lie) << " in batch " << wrong << ", batch " << k;
     }
@@ -88,16 +89,16 @@ TEST(Verify, FindsEveryLieInItsBatch) {
 
 TEST(Verify, SaysWhere) {
   const auto verification = verify_with(LyingEngine::Lie::bit, 15);
-  EXPECT_EQ(verification.batches[15].difference.find("out.masking differs in 1 lanes, first in lane 1234: "),
-            0u)
-      << verification.batches[15].difference;
+  const std::string& difference = verification.batches[15].difference;
+  EXPECT_TRUE(difference.starts_with("out.")) << difference;
+  EXPECT_NE(difference.find(" differs in 1 lanes, first in lane 1234: "), difference.npos) << difference;
 }
 
 TEST(VerifyCases, CoverEverySamplerAndOperation) {
   const auto cases = verify_cases(samplers());
-  EXPECT_EQ(cases.size(), 16u);
+  EXPECT_GT(cases.size(), 100u);
   for (const Sampler sampler : all_samplers())
-    EXPECT_EQ(std::count_if(cases.begin(), cases.end(),
+    EXPECT_GE(std::count_if(cases.begin(), cases.end(),
                             [&](const VerifyCase& c) {
                               return c.operation == Operation::sample_reflection && c.sampler == sampler;
                             }),

@@ -25,18 +25,18 @@ TEST(Selection, UnknownValues) {
     }
   // The first value past each end.
   MalformedCall distribution(kSample), masking(kSample), shadowing(kSample), sampler(kSample);
-  distribution.batch.model.distribution = static_cast<Distribution>(1);
+  distribution.batch.model.distribution = static_cast<Distribution>(5);
   distribution.refused("model.distribution");
-  masking.batch.model.masking = static_cast<Masking>(1);
+  masking.batch.model.masking = static_cast<Masking>(2);
   masking.refused("model.masking");
   shadowing.batch.model.shadowing = static_cast<Shadowing>(2);
   shadowing.refused("model.shadowing");
-  sampler.batch.sampler = static_cast<Sampler>(5);
+  sampler.batch.sampler = static_cast<Sampler>(6);
   sampler.refused("sampler");
 }
 
 TEST(Selection, UnknownOperation) {
-  for (const int value : {6, 7, 200, 255}) {
+  for (const int value : {10, 11, 200, 255}) {
     MalformedCall spoilt(kSample);
     const Answer before = spoilt.answer;
     const auto statistics = run(static_cast<Operation>(value), spoilt.batch);

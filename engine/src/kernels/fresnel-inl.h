@@ -39,14 +39,26 @@ HWY_INLINE V DielectricReflectance(D d, V c, V eta, V& g) {
   return Select(g2 > zero, Min(f, one), one);
 }
 
-// By the model's interface.
-template <class D, class V = Vec<D>>
-HWY_INLINE V Reflectance(D d, const Tile& tile, std::size_t lane, V c) {
-  if (tile.interface == Interface::schlick)
-    return SchlickReflectance(d, c, LoadU(d, tile.in[kF0] + lane), LoadU(d, tile.in[kF90] + lane));
-  V g;
-  return DielectricReflectance(d, c, LoadU(d, tile.in[kEta] + lane), g);
-}
+// The interface's columns. They are loaded before anything is stored, as outputs may take their place.
+template <class D>
+struct InterfaceInputs {
+  using V = Vec<D>;
+  V f0, f90, eta;
+  HWY_INLINE InterfaceInputs(D d, const Tile& tile, std::size_t lane) : f0(Zero(d)), f90(f0), eta(f0) {
+    if (tile.interface == Interface::schlick) {
+      f0 = LoadU(d, tile.in[kF0] + lane);
+      f90 = LoadU(d, tile.in[kF90] + lane);
+    } else if (tile.interface == Interface::dielectric) {
+      eta = LoadU(d, tile.in[kEta] + lane);
+    }
+  }
+  // By the model's interface, which is no conductor.
+  HWY_INLINE V Reflectance(D d, const Tile& tile, V c) const {
+    if (tile.interface == Interface::schlick) return SchlickReflectance(d, c, f0, f90);
+    V g;
+    return DielectricReflectance(d, c, eta, g);
+  }
+};
 
 // Whether the interface's own columns are valid. NaN is not.
 template <class D>

@@ -261,6 +261,7 @@ struct Sample {
     Policy<D> policy;
     if constexpr (!kFast) policy = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, policy);
+    const InterfaceInputs<D> interface(d, tile, lane);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
 
     Drawn<D> drawn;
@@ -317,8 +318,8 @@ struct Sample {
         V weight = S::Masking::template Weight<Sampler>(d, i, drawn, ox, oy, oz, tile.uncorrelated);
         V mirror = one;
         if (fresnel) {
-          weight = weight * Reflectance(d, tile, lane, im);
-          mirror = Reflectance(d, tile, lane, in.z);
+          weight = weight * interface.Reflectance(d, tile, im);
+          mirror = interface.Reflectance(d, tile, in.z);
         }
         mirror = IfThenElseZero(in.z > zero, mirror);
         StoreU(exceptions.Output(IfThenElseZero(accepted, weight), mirror), d, tile.out[kOutWeight] + lane);
@@ -375,6 +376,7 @@ struct Query {
     Policy<D> policy;
     if constexpr (!kFast) policy = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, policy);
+    const InterfaceInputs<D> interface(d, tile, lane);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     V x = exceptions.Harmless(in.ox, 0.0f), y = exceptions.Harmless(in.oy, 0.0f);
     const V z = exceptions.Harmless(in.oz, 1.0f);
@@ -414,7 +416,7 @@ struct Query {
       S::Masking::Value(d, i, mz, im, x, y, z, tile.uncorrelated, two_n, w);
       V value = Min(density / (denominator * two_n), largest) * IfThenElseZero(above, w);
       if constexpr (S::Masking::kUnboundedW) value = Min(value, largest);
-      if (tile.interface != Interface::conductor) value = value * Reflectance(d, tile, lane, Sqrt(m2) * Set(d, 0.5f));
+      if (tile.interface != Interface::conductor) value = value * interface.Reflectance(d, tile, Sqrt(m2) * Set(d, 0.5f));
       StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
     }
     exceptions.Finish(tile, lane, Or(Not(above), S::Masking::Blind(d, i)), statistics);
