@@ -101,8 +101,8 @@ TEST(VerifyVerb, ComparesWithAServer) {
   EXPECT_GT(backfacing, 0.02);
   EXPECT_LT(backfacing, 0.30);
   ASSERT_GT(json["batches"].size(), 100u);
-  ASSERT_EQ(json["reflections"].size(), 5u);
-  // In the samplers' order, from the most rejections to none.
+  ASSERT_GE(json["reflections"].size(), 5u);
+  // GGX first, in the samplers' order, from the most rejections to none.
   std::vector<std::uint64_t> occluded;
   for (const auto& sampler : json["reflections"]) occluded.push_back(sampler["occluded"]);
   EXPECT_GT(occluded[0], occluded[1]);  // ndf, heitz

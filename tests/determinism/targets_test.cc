@@ -29,7 +29,7 @@ TEST(Targets, SameBitsForAnyBits) { expect_targets_agree(hard_lanes(Kind::any_bi
 
 // The lanes above are as hard as they are said to be.
 TEST(Targets, LanesReachEveryStatus) {
-  for (const Call& call : all_calls()) {
+  for (const Call& call : plain_calls()) {
     const bool never_occluded =
         call.operation == Operation::masking ||
         (call.operation == Operation::sample_normal && call.sampler != Sampler::ndf) ||
