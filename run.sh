@@ -11,7 +11,7 @@ On a Debian 12 machine, from nothing to a measured result:
   1. installs the packages that are missing (cmake/packages.txt; asks sudo if not root);
   2. builds the release preset into build/release;
   3. starts `facetwise serve` in its own process, on a Unix socket;
-  4. sends it 16 batches of 1,048,576 lanes traced with Embree at a mesh, recomputes every answer here and
+  4. sends it batches of 1,048,576 lanes of every model, traced with Embree at a mesh, recomputes every answer here and
      compares every byte (`facetwise verify`);
   5. runs a short benchmark, scalar, SIMD, threads and remote (`facetwise bench`);
   6. prints a summary.
@@ -74,7 +74,7 @@ for _ in $(seq 100); do
 done
 [ -n "$ready" ] || { cat out/server.log out/info.log >&2; echo "run.sh: the server did not start" >&2; exit 1; }
 
-say "verify: 16 batches of traced rays against the server"
+say "verify: batches of traced rays against the server"
 rm -f out/verify.json out/report.json
 logged verify "$facetwise" verify --remote "$address" --json out/verify.json
 say "benchmark: under a minute (out/bench.log)"
