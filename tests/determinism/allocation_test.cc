@@ -55,6 +55,7 @@ TEST(Allocation, NoneByCalls) {
     for (const OutputField& field : output_fields())
       if (writes(call, field)) field.column(strided) = {field.column(strided).data(), count / 2, 8};
     strided.out.status = {answer.status.data(), count / 2, 2};
+    if (strided.out.event.present()) strided.out.event = {answer.event.data(), count / 2, 2};
     if (strided.u1.present()) {
       strided.u1 = strided.u2 = strided.u3 = {};
       strided.generator = Generator{.seed = 1};

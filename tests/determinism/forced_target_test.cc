@@ -76,7 +76,8 @@ TEST(ForcedTarget, IsTheOneThatRuns) {
                                                {Target::neon, "N_NEON"}};
   const Lanes lanes = hard_lanes(Kind::ordinary, 4096, 15);
   for (const Operation operation : all_operations()) {
-    const Call call{operation, Sampler::cap, Shadowing::correlated};
+    Call call{operation, Sampler::cap, Shadowing::correlated};
+    if (operation >= Operation::sample_transmission) call.model.interface = Interface::dielectric;
     for (const Target target : available_targets())
       for (const bool one_lane : {false, true}) {
         const auto kernels = profile(call, lanes, {target, one_lane, true});

@@ -168,7 +168,7 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
     }
     if (transmits(operation)) b.out.eta_scale = out(&Result::eta_scale);
   } else if (operation == Operation::masking) {
-    b.out.masking = out(&Result::masking);
+    if (c.model.masking == Masking::smith) b.out.masking = out(&Result::masking);
     b.out.projected_area = out(&Result::area);
   } else {
     if (operation != Operation::evaluate_reflection) b.out.pdf = out(&Result::pdf);

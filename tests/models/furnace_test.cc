@@ -20,11 +20,14 @@ TEST_P(ModelFurnace, MeanWeightIsTheAlbedo) {
   for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated}) {
     if (shadowing == Shadowing::uncorrelated && GetParam().masking == Masking::vcavity)
       continue;  // no part there
+    // The reference's integrals take long on an emulator; they are the same there.
+    if (kQuick && shadowing == Shadowing::uncorrelated) continue;
     for (const Interface interface : {Interface::conductor, Interface::schlick, Interface::dielectric}) {
       Composition c = plain(GetParam(), Sampler::visible);
       c.model.shadowing = shadowing;
       c.model.interface = interface;
       std::vector<Point> points = calm_points(c);
+      if (kQuick) points.resize(2);
       for (std::size_t n = 0; n < points.size(); ++n) {
         if (interface != Interface::conductor && n % 2 == 0) continue;
         const double albedo = reference::albedo(surface_of(c, points[n]), incident(points[n]));

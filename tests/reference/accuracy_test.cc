@@ -244,14 +244,15 @@ void compare(Operation operation, const Model& model, Sampler sampler, std::size
     batch.lanes = lanes;
     for (const InputField& field : input_fields()) {
       const auto index = static_cast<std::size_t>(&field - input_fields().data());
-      // The table's order: i, alpha, o, u.
-      constexpr int kOrder[] = {kIx, kIy, kIz, kAlphaX, kAlphaY, kOx, kOy, kOz, kU1, kU2, kU3};
-      if (field.operations & bit(operation)) {
-        if (kOrder[index] == kU3 && !uses_u3({}, sampler)) continue;
-        field.column(batch) = columns.column[kOrder[index]];
-      }
+      // The table's order: i, alpha, moments and interface (none here), o, u.
+      constexpr int kNone = -1;
+      constexpr int kOrder[] = {kIx,   kIy,   kIz, kAlphaX, kAlphaY, kNone, kNone, kNone, kNone,
+                                kNone, kNone, kOx, kOy,     kOz,     kU1,   kU2,   kU3};
+      if (!(field.operations & bit(operation)) || kOrder[index] == kNone) continue;
+      if (kOrder[index] == kU3 && !uses_u3({}, sampler)) continue;
+      field.column(batch) = columns.column[kOrder[index]];
     }
-    for (const OutputField& field : output_fields()) {
+    for (const OutputField& field : output_fields().first(std::size(out))) {
       const auto index = static_cast<std::size_t>(&field - output_fields().data());
       out[index].resize(lanes);
       if (field.operations & bit(operation)) field.column(batch) = out[index];
