@@ -85,18 +85,6 @@ absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& a
 
 namespace {
 
-// Whether a model reads a column that the operation knows: a column is missing where it does, and one too
-// many where it does not.
-bool reads(const Batch& batch, std::size_t input) {
-  const Interface interface = batch.model.interface;
-  switch (input) {
-    case kEta: return interface == Interface::dielectric;
-    case kF0:
-    case kF90: return interface == Interface::schlick;
-    default: return true;
-  }
-}
-
 absl::Status check_inputs(Operation operation, const Batch& batch, const BatchColumns& columns) {
   const InputField* fields = input_fields().data();
   for (std::size_t k = 0; k < kInputs; ++k) {
@@ -105,17 +93,18 @@ absl::Status check_inputs(Operation operation, const Batch& batch, const BatchCo
     if (!known && !column.present()) continue;
     const absl::string_view field = view(fields[k].name);
     const bool random = k >= kU1;
-    const bool read = reads(batch, k);
     if (!column.present()) {
-      const bool needed = read && !fields[k].otherwise && !(random && batch.generator) &&
-                          !(k == kU3 && !reads_u3(operation, batch));
+      const bool needed = !fields[k].otherwise && !(random && batch.generator) &&
+                          reads(operation, batch.model, batch.sampler, static_cast<InputIndex>(k));
       if (!needed) continue;
       return invalid(field, random ? absl::StrCat("missing: ", view(name(batch.sampler)),
                                                   " needs it unless a generator is given")
                                    : absl::StrCat("missing: ", view(name(operation)), " needs it"));
     }
     if (!known) return invalid(field, absl::StrCat(view(name(operation)), " does not read it"));
-    if (!read) return invalid(field, absl::StrCat("a ", view(name(batch.model.interface)), " interface does not read it"));
+    // A u3 that the sampler does not need does no harm.
+    if (!random && !reads(operation, batch.model, batch.sampler, static_cast<InputIndex>(k)))
+      return invalid(field, absl::StrCat("a ", view(name(batch.model.interface)), " interface does not read it"));
     if (random && batch.generator) return invalid("generator", absl::StrCat("given together with ", field));
     if (auto status = check_input(field, column, batch.lanes); !status.ok()) return status;
   }
@@ -133,7 +122,7 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
     const absl::string_view field = view(fields[k].name);
     if (!(fields[k].operations & bit(operation)))
       return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
-    if (!computes(operation, batch.model, fields[k]))
+    if (!computes(operation, batch.model, static_cast<OutputIndex>(k)))
       return invalid(field, k == kOutShare ? "known in closed form for ggx with smith masking only"
                                            : "depends on the normal with vcavity masking");
     if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
@@ -149,49 +138,64 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
   return absl::OkStatus();
 }
 
-absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
-  struct Use {
-    const std::string_view* field;
-    MemoryUse memory;
-  };
-  static constexpr std::string_view kId = "generator.id", kActive = "active";
-  Use inputs[kInputs + 2], outputs[std::size_t{kOutputs} + kByteOutputs];
-  std::size_t input_count = 0, output_count = 0;
-  for (std::size_t k = 0; k < kInputs; ++k)
-    if (columns.in[k]->present())
-      inputs[input_count++] = {&input_fields()[k].name, memory_use(*columns.in[k])};
-  if (batch.generator && batch.generator->id.present())
-    inputs[input_count++] = {&kId, memory_use(batch.generator->id)};
-  if (batch.active)
-    inputs[input_count++] = {&kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4)};
-  for (std::size_t k = 0; k < kOutputs; ++k)
-    if (columns.out[k]->present())
-      outputs[output_count++] = {&output_fields()[k].name, memory_use(*columns.out[k])};
-  for (std::size_t k = 0; k < kByteOutputs; ++k)
-    if (columns.byte_out[k]->present())
-      outputs[output_count++] = {&byte_fields()[k].name, memory_use(*columns.byte_out[k])};
+struct Use {
+  const std::string_view* field;
+  MemoryUse memory;
+};
 
-  for (std::size_t k = 0; k < output_count; ++k) {
-    for (std::size_t j = 0; j < input_count; ++j) {
-      if (!ranges_meet(outputs[k].memory, inputs[j].memory)) continue;
-      const bool same_lanes = outputs[k].memory == inputs[j].memory && inputs[j].field != &kActive;
-      if (!same_lanes && share_memory(outputs[k].memory, inputs[j].memory))
-        return invalid(view(*outputs[k].field), absl::StrCat("overlaps ", view(*inputs[j].field), ": an output may be an input's ",
-                                                      "own lanes or separate memory"));
+// Outputs first.
+struct Uses {
+  static constexpr std::size_t kMost = std::size_t{kOutputs} + kByteOutputs + kInputs + 2;
+  Use use[kMost];
+  std::size_t outputs = 0, all = 0;
+  void add(const std::string_view& field, const MemoryUse& memory) { use[all++] = {&field, memory}; }
+
+  // Nearly always nothing meets, which comparisons without branches find quickest.
+  bool any_meet() const {
+    bool meet = false;
+    for (std::size_t k = 0; k < outputs; ++k)
+      for (std::size_t j = k + 1; j < all; ++j) meet |= ranges_meet(use[k].memory, use[j].memory);
+    return meet;
+  }
+};
+
+absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
+  static constexpr std::string_view kId = "generator.id", kActive = "active";
+  Uses uses;
+  for (std::size_t k = 0; k < kOutputs; ++k)
+    if (columns.out[k]->present()) uses.add(output_fields()[k].name, memory_use(*columns.out[k]));
+  for (std::size_t k = 0; k < kByteOutputs; ++k)
+    if (columns.byte_out[k]->present()) uses.add(byte_fields()[k].name, memory_use(*columns.byte_out[k]));
+  uses.outputs = uses.all;
+  for (std::size_t k = 0; k < kInputs; ++k)
+    if (columns.in[k]->present()) uses.add(input_fields()[k].name, memory_use(*columns.in[k]));
+  if (batch.generator && batch.generator->id.present()) uses.add(kId, memory_use(batch.generator->id));
+  if (batch.active) uses.add(kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4));
+  if (!uses.any_meet()) return absl::OkStatus();
+
+  for (std::size_t k = 0; k < uses.outputs; ++k) {
+    const Use& output = uses.use[k];
+    for (std::size_t j = uses.outputs; j < uses.all; ++j) {
+      const Use& input = uses.use[j];
+      const bool same_lanes = output.memory == input.memory && input.field != &kActive;
+      if (!same_lanes && share_memory(output.memory, input.memory))
+        return invalid(view(*output.field), absl::StrCat("overlaps ", view(*input.field),
+                                                         ": an output may be an input's own lanes or separate memory"));
     }
     for (std::size_t j = 0; j < k; ++j)
-      if (ranges_meet(outputs[k].memory, outputs[j].memory) && share_memory(outputs[k].memory, outputs[j].memory))
-        return invalid(view(*outputs[k].field), absl::StrCat("overlaps ", view(*outputs[j].field)));
+      if (share_memory(output.memory, uses.use[j].memory))
+        return invalid(view(*output.field), absl::StrCat("overlaps ", view(*uses.use[j].field)));
   }
   return absl::OkStatus();
 }
 
 }  // namespace
 
-absl::Status check(Operation operation, const Batch& batch) {
+absl::Status check(Operation operation, const Batch& batch) { return check(operation, batch, BatchColumns(batch)); }
+
+absl::Status check(Operation operation, const Batch& batch, const BatchColumns& columns) {
   if (auto status = check_composition(operation, batch); !status.ok()) return status;
   if (auto status = check_active(batch.active, batch.lanes); !status.ok()) return status;
-  const BatchColumns columns(batch);
   if (auto status = check_inputs(operation, batch, columns); !status.ok()) return status;
   if (auto status = check_outputs(operation, batch, columns); !status.ok()) return status;
   return check_overlap(batch, columns);

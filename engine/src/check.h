@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/string_view.h"
 #include "facetwise/engine.h"
+#include "src/fields.h"
 
 namespace facetwise {
 
@@ -29,7 +30,7 @@ MemoryUse memory_use(const Column& column) {
 }
 
 // Whether two columns' ranges meet, and whether their values do.
-inline bool ranges_meet(const MemoryUse& a, const MemoryUse& b) { return a.begin < b.end && b.begin < a.end; }
+inline bool ranges_meet(const MemoryUse& a, const MemoryUse& b) { return (a.begin < b.end) & (b.begin < a.end); }
 bool share_memory(const MemoryUse& a, const MemoryUse& b);
 
 // Length, null, alignment, stride. Errors begin with the field's name.
@@ -37,6 +38,7 @@ template <class T>
 absl::Status check_input(absl::string_view field, const Column<T>& column, std::size_t lanes);
 template <class T>
 absl::Status check_output(absl::string_view field, const OutputColumn<T>& column, std::size_t lanes);
+absl::Status check(Operation operation, const Batch& batch, const BatchColumns& columns);
 absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& active, std::size_t lanes);
 
 }  // namespace facetwise

@@ -35,8 +35,14 @@ const SurfaceKernels& surface_of(const DistributionKernels& kernels, Masking mas
   return affine ? kernels.smith_affine : kernels.smith;
 }
 
+// Every target has kernels for the same compositions.
+const KernelTable& any_kernels() {
+  static const KernelTable& table = kernels(*resolve(Target::best), false);
+  return table;
+}
+
 const DistributionKernels& kernels_of(Distribution distribution) {
-  return *kernels(*resolve(Target::best), false).distribution[static_cast<std::size_t>(distribution)];
+  return *any_kernels().distribution[static_cast<std::size_t>(distribution)];
 }
 
 std::string model_name(const Model& model) {
@@ -49,7 +55,7 @@ std::string names_of(const std::vector<Sampler>& samplers) {
 
 std::vector<Sampler> samplers_for(Operation operation, const Model& model, bool affine) {
   std::vector<Sampler> samplers;
-  const KernelTable& table = kernels(*resolve(Target::best), false);
+  const KernelTable& table = any_kernels();
   for (const Sampler sampler : all_samplers())
     if (reads_sampler(operation) && find_kernel(table, operation, model, sampler, affine)) samplers.push_back(sampler);
   return samplers;
@@ -64,10 +70,6 @@ bool is_affine(const Batch& batch) {
 bool samples(Operation operation) {
   return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
          operation == Operation::sample_transmission || operation == Operation::sample_scattering;
-}
-
-bool reads_u3(Operation operation, const Batch& batch) {
-  return samples(operation) && (uses_u3(batch.model, batch.sampler) || operation == Operation::sample_scattering);
 }
 
 Kernel find_kernel(const KernelTable& table, Operation operation, const Model& model, Sampler sampler, bool affine) {
@@ -87,14 +89,6 @@ Kernel find_kernel(const KernelTable& table, Operation operation, const Model& m
     case Operation::evaluate_scattering: return surface.scatter_query[index];
   }
   return nullptr;
-}
-
-bool computes(Operation operation, const Model& model, const OutputField& field) {
-  if (!(field.operations & bit(operation))) return false;
-  if (&field == &output_fields()[kOutShare])
-    return model.distribution == Distribution::ggx && model.masking == Masking::smith;
-  if (&field == &output_fields()[kOutMasking]) return model.masking == Masking::smith;
-  return true;
 }
 
 std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
@@ -141,8 +135,7 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
     return invalid("model.retro", "needs normals that are distributed symmetrically about n: not with a mean slope");
 
   if (!reads_sampler(operation)) return absl::OkStatus();
-  const KernelTable& kernel_table = kernels(*resolve(Target::best), false);
-  if (find_kernel(kernel_table, operation, model, batch.sampler, affine)) return absl::OkStatus();
+  if (find_kernel(any_kernels(), operation, model, batch.sampler, affine)) return absl::OkStatus();
   const char* with = !affine ? "" : batch.slope_correlation.present() ? " and correlated roughness" : " and a mean slope";
   return invalid("sampler", absl::StrCat(named(batch.sampler), " does not fit ", named(operation), " of ", model_name(model),
                                          with, "; what does: ", names_of(samplers_for(operation, model, affine))));

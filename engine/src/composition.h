@@ -3,6 +3,7 @@
 
 #include "absl/status/status.h"
 #include "facetwise/batch.h"
+#include "src/fields.h"
 
 namespace facetwise {
 
@@ -11,8 +12,10 @@ absl::Status check_composition(Operation operation, const Batch& batch);
 
 // Whether mean slopes or correlated roughness are given.
 bool is_affine(const Batch& batch);
-// Whether the operation draws random numbers, and a third one.
+// Whether the operation draws random numbers.
 bool samples(Operation operation);
-bool reads_u3(Operation operation, const Batch& batch);
+// batch.h's, by the fields' indices.
+bool reads(Operation operation, const Model& model, Sampler sampler, InputIndex input);
+bool computes(Operation operation, const Model& model, OutputIndex output);
 
 }  // namespace facetwise

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "facetwise/target.h"
+#include "hwy/cache_control.h"
 #include "src/tile.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -28,10 +29,13 @@ extern const KernelTable kOneLaneTable;
 #define FACETWISE_ENTRY(Name) &k##Name,
 const KernelTable kTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)},
                             Philox<hn::ScalableTag<float>>,
-                            hn::MaxLanes(hn::ScalableTag<float>())};
+                            hn::MaxLanes(hn::ScalableTag<float>()),
+                            kStreams<hn::ScalableTag<float>>,
+                            hwy::FlushStream};
 #undef FACETWISE_ENTRY
 #define FACETWISE_ENTRY(Name) &kOneLane##Name,
-const KernelTable kOneLaneTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1};
+const KernelTable kOneLaneTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1, false,
+                                   hwy::FlushStream};
 #undef FACETWISE_ENTRY
 
 }  // namespace HWY_NAMESPACE

@@ -12,20 +12,19 @@ namespace facetwise {
 // Below this many lanes (some microseconds) a call stays on its thread; above, ranges are at least half of it.
 inline constexpr std::size_t kGrain = 8192;
 
-// Calls body(begin, end) on ranges that make up [0, positions), in the caller's TBB arena. Ranges begin at
-// multiples of kUnit lanes: whole vectors of every target.
+inline bool stays_on_thread(std::size_t positions, const Execution& execution) {
+  return execution.single_thread || positions <= kGrain;
+}
+
+// Calls body(begin, end) on ranges that make up [0, positions), in the caller's TBB arena. Ranges but the first begin
+// at `head` and a multiple of kUnit lanes: whole vectors of every target.
 template <class Body>
-void for_each_range(std::size_t positions, const Execution& execution, const Body& body) {
-  if (positions == 0) return;
-  if (execution.single_thread || positions <= kGrain) {
-    body(std::size_t{0}, positions);
-    return;
-  }
+void for_each_range(std::size_t positions, std::size_t head, const Body& body) {
   constexpr std::size_t kUnit = 1024;
-  const std::size_t units = (positions + kUnit - 1) / kUnit;
+  const std::size_t units = (positions - head + kUnit - 1) / kUnit;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, units, kGrain / kUnit), [&](const auto& range) {
-    const std::size_t end = range.end() * kUnit;
-    body(range.begin() * kUnit, end < positions ? end : positions);
+    const std::size_t end = head + range.end() * kUnit;
+    body(range.begin() == 0 ? 0 : head + range.begin() * kUnit, end < positions ? end : positions);
   });
 }
 

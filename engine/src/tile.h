@@ -1,5 +1,5 @@
 // What a kernel sees: pointers to contiguous lanes. Strides, active lists, one-value columns and generated
-// numbers are resolved before (batch.cc), so that kernels know nothing of them.
+// numbers are resolved before (stage.h), so that kernels know nothing of them.
 #pragma once
 
 #include <cstddef>
@@ -8,50 +8,31 @@
 #include "facetwise/batch.h"
 #include "facetwise/slope_table.h"
 #include "facetwise/target.h"
+#include "src/fields.h"
 
 namespace facetwise {
 
-// Indices of a tile's columns: the order of input_fields(), output_fields() and byte_fields().
-enum InputIndex {
-  kIx, kIy, kIz, kAlphaX, kAlphaY, kMeanX, kMeanY, kCorrelation, kEta, kF0, kF90, kOx, kOy, kOz, kU1, kU2, kU3, kInputs
-};
-enum OutputIndex {
-  kOutOx, kOutOy, kOutOz, kOutMx, kOutMy, kOutMz, kOutIm, kOutPdf, kOutWeight, kOutValue, kOutMasking,
-  kOutArea, kOutShare, kOutBranch, kOutEtaScale, kOutputs
-};
-enum ByteIndex { kOutStatus, kOutEvent, kByteOutputs };
+// Floats of a cache line.
+inline constexpr std::size_t kLine = 16;
 
-inline constexpr unsigned kWantsNormal = 1;  // m or i.m
-inline constexpr unsigned kWantsPdf = 2;
-inline constexpr unsigned kWantsWeight = 4;
-inline constexpr unsigned kWantsShare = 8;
-inline constexpr unsigned kWantsStatus = 16;
-inline constexpr unsigned kWantsValue = 32;
+// Bits of Tile::wanted and Tile::streamed.
+constexpr unsigned bit(OutputIndex output) { return 1u << output; }
+inline constexpr unsigned kWantsNormal = bit(kOutMx) | bit(kOutMy) | bit(kOutMz) | bit(kOutIm);
+inline constexpr unsigned kWantsPdf = bit(kOutPdf), kWantsWeight = bit(kOutWeight), kWantsValue = bit(kOutValue),
+                          kWantsShare = bit(kOutShare);
 
-// A batch's columns by these indices.
-struct BatchColumns {
-  const Column<float>* in[kInputs];
-  const OutputColumn<float>* out[kOutputs];
-  const OutputColumn<std::uint8_t>* byte_out[kByteOutputs];
-  explicit BatchColumns(const Batch& b) {
-    Batch& batch = const_cast<Batch&>(b);  // the tables name the columns of batches that are filled in
-    for (std::size_t k = 0; k < kInputs; ++k) in[k] = &input_fields()[k].column(batch);
-    for (std::size_t k = 0; k < kOutputs; ++k) out[k] = &output_fields()[k].column(batch);
-    for (std::size_t k = 0; k < kByteOutputs; ++k) byte_out[k] = &byte_fields()[k].column(batch);
-  }
-};
-
-// The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and written up to the next
-// multiple of it.
+// The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and
+// written up to the next multiple of it.
 inline constexpr std::size_t kWidest = 32;
 
 struct Tile {
   std::size_t lanes = 0;
   const float* in[kInputs] = {};   // those that the operation reads, the optional ones too
-  float* out[kOutputs] = {};       // all that it has; unwanted ones are scratch memory
-  std::uint8_t* status = nullptr;  // null unless wanted has kWantsStatus
-  std::uint8_t* event = nullptr;   // of scattering; scratch memory if unwanted
-  unsigned wanted = 0;             // kWants...: where leaving an output out saves work
+  float* out[kOutputs] = {};       // the wanted ones
+  std::uint8_t* status = nullptr;  // null unless wanted
+  std::uint8_t* event = nullptr;   // likewise
+  unsigned wanted = 0;             // bit(OutputIndex): what is computed and stored
+  unsigned streamed = 0;           // the same: stored past the caches; those begin at a cache line
   // What is the same for all lanes and too small to compile kernels apart for.
   bool normals_alone = false;      // sample_normal
   bool transmits = false;          // *_transmission, of the kernels that also serve *_scattering
@@ -95,6 +76,8 @@ struct KernelTable {
   const DistributionKernels* distribution[5];  // indexed by Distribution; null at the end where there are no more
   void (*philox)(const PhiloxTile& tile);
   std::size_t vector_lanes;
+  bool streams;              // there are streaming stores
+  void (*finish_streams)();  // what was streamed is seen by all who are told of it afterwards
 };
 
 // The kernels of an available target (target.h), full vectors or one lane wide.

@@ -151,6 +151,9 @@ struct ByteField {
   unsigned operations;
 };
 std::span<const ByteField> byte_fields();
+// Whether a call reads a field, if only where it is given (`otherwise`): those of the model's interface, u3 where the
+// sampler or the choice of an event needs it. A generator stands in for u1, u2 and u3.
+bool reads(Operation, const Model&, Sampler, const InputField&);
 // Whether an operation computes a field for a model: share_unoccluded is known for GGX with Smith alone, and
 // V-cavity's masking depends on m.
 bool computes(Operation, const Model&, const OutputField&);

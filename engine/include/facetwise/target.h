@@ -30,6 +30,15 @@ std::optional<Target> resolve(Target target);
 // Lanes in one vector of an available target: 16 for avx3, 8 avx2, 4 neon, 1 scalar.
 std::size_t vector_lanes(Target target);
 
+// How outputs are stored. Streaming stores write whole cache lines past the caches: quicker where a batch does not fit
+// into them, slower where the results are read again at once. Only contiguous columns of a call without an active list
+// are streamed, on x86.
+enum class Stores : std::uint8_t {
+  automatic = 0,  // streaming if the call's columns are larger than the caches
+  cached = 1,
+  streaming = 2,
+};
+
 // How a call runs. The defaults are right for everything but tests and benchmarks.
 struct Execution {
   Target target = Target::best;
@@ -37,6 +46,7 @@ struct Execution {
   bool one_lane = false;
   // Stay on the calling thread. Otherwise work spreads over the caller's TBB arena.
   bool single_thread = false;
+  Stores stores = Stores::automatic;
 };
 
 }  // namespace facetwise

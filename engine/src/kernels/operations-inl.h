@@ -17,6 +17,19 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
+// Stores a vector of an output if it is wanted.
+template <class D, class V = Vec<D>>
+HWY_INLINE void Store(D d, const Tile& tile, OutputIndex output, std::size_t lane, V value) {
+  if (!(tile.wanted & bit(output))) return;
+  if constexpr (kStreams<D>) {
+    if (tile.streamed & bit(output)) {
+      Stream(value, d, tile.out[output] + lane);
+      return;
+    }
+  }
+  StoreU(value, d, tile.out[output] + lane);
+}
+
 // Which lanes are ordinary, smooth or invalid (LaneStatus): model.h's policy. NaN fails every comparison.
 template <class D>
 struct Policy {
@@ -99,7 +112,7 @@ class Exceptions {
     const Rebind<uint8_t, D> db;
     if constexpr (kFast) {
       statistics.occluded += CountTrue(d_, occluded);
-      if (tile.wanted & kWantsStatus) {
+      if (tile.status != nullptr) {
         const auto status = IfThenElseZero(RebindMask(di, occluded), Code(LaneStatus::occluded));
         StoreU(DemoteTo(db, status), db, tile.status + lane);
       }
@@ -110,7 +123,7 @@ class Exceptions {
     statistics.occluded += CountTrue(d_, And(occluded, real));
     statistics.smooth += CountTrue(d_, And(policy_.smooth, real));
     statistics.invalid += CountTrue(d_, AndNot(policy_.valid, real));
-    if (tile.wanted & kWantsStatus) {
+    if (tile.status != nullptr) {
       auto status = IfThenElseZero(RebindMask(di, occluded), Code(LaneStatus::occluded));
       status = Select(RebindMask(di, policy_.smooth), Code(LaneStatus::smooth), status);
       status = Select(RebindMask(di, policy_.valid), status, Code(LaneStatus::invalid));
@@ -305,13 +318,13 @@ struct Sample {
         V mx = drawn.mx * inverse_length, my = drawn.my * inverse_length;
         TurnIfRetro(d, tile, mx, my);
         in.Out(mx, my);
-        StoreU(exceptions.Output(mx, zero), d, tile.out[kOutMx] + lane);
-        StoreU(exceptions.Output(my, zero), d, tile.out[kOutMy] + lane);
-        StoreU(exceptions.Output(drawn.mz * inverse_length, one), d, tile.out[kOutMz] + lane);
-        StoreU(exceptions.Output(im, in.z), d, tile.out[kOutIm] + lane);
+        Store(d, tile, kOutMx, lane, exceptions.Output(mx, zero));
+        Store(d, tile, kOutMy, lane, exceptions.Output(my, zero));
+        Store(d, tile, kOutMz, lane, exceptions.Output(drawn.mz * inverse_length, one));
+        Store(d, tile, kOutIm, lane, exceptions.Output(im, in.z));
       }
     }
-    StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
+    Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
 
     if (!tile.normals_alone) {
       if (tile.wanted & kWantsWeight) {
@@ -322,16 +335,16 @@ struct Sample {
           mirror = interface.Reflectance(d, tile, in.z);
         }
         mirror = IfThenElseZero(in.z > zero, mirror);
-        StoreU(exceptions.Output(IfThenElseZero(accepted, weight), mirror), d, tile.out[kOutWeight] + lane);
+        Store(d, tile, kOutWeight, lane, exceptions.Output(IfThenElseZero(accepted, weight), mirror));
       }
       V mirror_x = Neg(in.x), mirror_y = Neg(in.y);
       TurnIfRetro(d, tile, ox, oy);
       TurnIfRetro(d, tile, mirror_x, mirror_y);
       in.Out(ox, oy);
       in.Out(mirror_x, mirror_y);
-      StoreU(exceptions.Output(ox, mirror_x), d, tile.out[kOutOx] + lane);
-      StoreU(exceptions.Output(oy, mirror_y), d, tile.out[kOutOy] + lane);
-      StoreU(exceptions.Output(oz, in.z), d, tile.out[kOutOz] + lane);
+      Store(d, tile, kOutOx, lane, exceptions.Output(ox, mirror_x));
+      Store(d, tile, kOutOy, lane, exceptions.Output(oy, mirror_y));
+      Store(d, tile, kOutOz, lane, exceptions.Output(oz, in.z));
     }
     exceptions.Finish(tile, lane, occluded, statistics);
   }
@@ -409,7 +422,7 @@ struct Query {
       if constexpr (Distribution::kShifts && !Sampler::kShifted)
         if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, zero));
       const V pdf = Min(numerator / (denominator * two_n), largest);
-      StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
+      Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
     }
     if (tile.wanted & kWantsValue) {
       V two_n, w;
@@ -417,7 +430,7 @@ struct Query {
       V value = Min(density / (denominator * two_n), largest) * IfThenElseZero(above, w);
       if constexpr (S::Masking::kUnboundedW) value = Min(value, largest);
       if (tile.interface != Interface::conductor) value = value * interface.Reflectance(d, tile, Sqrt(m2) * Set(d, 0.5f));
-      StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
+      Store(d, tile, kOutValue, lane, exceptions.Output(value, zero));
     }
     exceptions.Finish(tile, lane, Or(Not(above), S::Masking::Blind(d, i)), statistics);
   }
@@ -444,10 +457,10 @@ struct MaskingOf {
     const V mirror = IfThenElseZero(in.z > zero, one);
     V masking, area;
     S::Masking::MaskingAndArea(d, i, masking, area);
-    StoreU(exceptions.Output(masking, mirror), d, tile.out[kOutMasking] + lane);
-    StoreU(exceptions.Output(area, mirror * in.z), d, tile.out[kOutArea] + lane);
+    Store(d, tile, kOutMasking, lane, exceptions.Output(masking, mirror));
+    Store(d, tile, kOutArea, lane, exceptions.Output(area, mirror * in.z));
     if (tile.wanted & kWantsShare)
-      StoreU(exceptions.Output(S::Masking::Share(d, i), one), d, tile.out[kOutShare] + lane);
+      Store(d, tile, kOutShare, lane, exceptions.Output(S::Masking::Share(d, i), one));
     exceptions.Finish(tile, lane, NoLanes(d), statistics);
   }
 };

@@ -114,7 +114,7 @@ struct Scatter {
       const V jacobian = Select(reflects, one, four * c * eta * (refraction.g / (refraction.bend * refraction.bend)));
       pdf = IfThenElseZero(accepted, Min(Min(numerator / denominator, largest) * jacobian * branch, largest));
     }
-    StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
+    Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
 
     const V radiance = tile.importance ? one : inverse_eta * inverse_eta;
     const Mirror mirror(d, in, tile, loaded_eta, u3);
@@ -130,7 +130,7 @@ struct Scatter {
       // F over its probability is `total`; so is 1 - F over the other. A forced event keeps 1 - F.
       V weight = Select(reflects, reflected_weight, transmitted_weight * radiance) * total;
       weight = Min(IfThenElseZero(accepted, weight), largest);
-      StoreU(exceptions.Output(weight, mirror.weight), d, tile.out[kOutWeight] + lane);
+      Store(d, tile, kOutWeight, lane, exceptions.Output(weight, mirror.weight));
     }
 
     V out_x = ox, out_y = oy, mirror_x = mirror.x, mirror_y = mirror.y, out_mx = mx, out_my = my;
@@ -140,22 +140,23 @@ struct Scatter {
     in.Out(out_x, out_y);
     in.Out(out_mx, out_my);
     in.Out(mirror_x, mirror_y);
-    StoreU(exceptions.Output(out_x, mirror_x), d, tile.out[kOutOx] + lane);
-    StoreU(exceptions.Output(out_y, mirror_y), d, tile.out[kOutOy] + lane);
-    StoreU(exceptions.Output(oz, mirror.z), d, tile.out[kOutOz] + lane);
-    StoreU(exceptions.Output(out_mx, zero), d, tile.out[kOutMx] + lane);
-    StoreU(exceptions.Output(out_my, zero), d, tile.out[kOutMy] + lane);
-    StoreU(exceptions.Output(mz, one), d, tile.out[kOutMz] + lane);
-    StoreU(exceptions.Output(c, in.z), d, tile.out[kOutIm] + lane);
-    StoreU(exceptions.Output(branch, mirror.branch), d, tile.out[kOutBranch] + lane);
+    Store(d, tile, kOutOx, lane, exceptions.Output(out_x, mirror_x));
+    Store(d, tile, kOutOy, lane, exceptions.Output(out_y, mirror_y));
+    Store(d, tile, kOutOz, lane, exceptions.Output(oz, mirror.z));
+    Store(d, tile, kOutMx, lane, exceptions.Output(out_mx, zero));
+    Store(d, tile, kOutMy, lane, exceptions.Output(out_my, zero));
+    Store(d, tile, kOutMz, lane, exceptions.Output(mz, one));
+    Store(d, tile, kOutIm, lane, exceptions.Output(c, in.z));
+    Store(d, tile, kOutBranch, lane, exceptions.Output(branch, mirror.branch));
     const V scale_t = tile.importance ? one : loaded_eta * loaded_eta;
     const auto transmits = And(accepted, Not(reflects));
-    StoreU(exceptions.Output(Select(transmits, scale_t, one), Select(mirror.reflects, one, scale_t)), d,
-           tile.out[kOutEtaScale] + lane);
-    const V event = exceptions.Output(IfThenElseZero(transmits, one), IfThenElseZero(Not(mirror.reflects), one));
-    const Rebind<int32_t, D> di;
-    const Rebind<uint8_t, D> db;
-    StoreU(DemoteTo(db, ConvertTo(di, event)), db, tile.event + lane);
+    Store(d, tile, kOutEtaScale, lane, exceptions.Output(Select(transmits, scale_t, one), Select(mirror.reflects, one, scale_t)));
+    if (tile.event != nullptr) {
+      const V event = exceptions.Output(IfThenElseZero(transmits, one), IfThenElseZero(Not(mirror.reflects), one));
+      const Rebind<int32_t, D> di;
+      const Rebind<uint8_t, D> db;
+      StoreU(DemoteTo(db, ConvertTo(di, event)), db, tile.event + lane);
+    }
     exceptions.Finish(tile, lane, Not(accepted), statistics);
   }
 
@@ -272,7 +273,7 @@ struct ScatterQuery {
       if constexpr (Distribution::kShifts && !Sampler::kShifted)
         if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, one, zero));
       const V pdf = Min(Min(numerator / (denominator * two_n), largest) * jacobian * branch, largest);
-      StoreU(exceptions.Output(pdf, zero), d, tile.out[kOutPdf] + lane);
+      Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
     }
     if (tile.wanted & kWantsValue) {
       V two_n, w;
@@ -283,9 +284,9 @@ struct ScatterQuery {
       const V transmission = Min(density / (denominator * S::Masking::VisibleTwoN(d, i, mz, c)), largest) * jacobian *
                              (masking * rest * radiance);
       const V value = Min(IfThenElseZero(reached, Select(reflects, reflection, transmission)), largest);
-      StoreU(exceptions.Output(value, zero), d, tile.out[kOutValue] + lane);
+      Store(d, tile, kOutValue, lane, exceptions.Output(value, zero));
     }
-    StoreU(exceptions.Output(branch, zero), d, tile.out[kOutBranch] + lane);
+    Store(d, tile, kOutBranch, lane, exceptions.Output(branch, zero));
     // A reflection that no microfacet makes is no occluded one, as in pdf_reflection.
     auto answered = Or(reflects, reached);
     if (tile.transmits) answered = reached;

@@ -55,6 +55,12 @@ struct TagTraits<Twice<D>> {
   using Rebound = Twice<hn::Rebind<T, D>>;
 };
 
+// Whether there are streaming stores: on x86, where two of these vectors fill a line at the least.
+template <class D>
+inline constexpr bool kStreams = HWY_ARCH_X86 && hn::MaxLanes(D()) >= 8;
+template <class D>
+inline constexpr bool kStreams<Twice<D>> = kStreams<D>;
+
 template <class D>
 using Vec = typename TagTraits<D>::V;
 template <class D>
@@ -135,6 +141,11 @@ template <class D, class V, class T>
 HWY_INLINE void StoreU(Pair<V> x, Twice<D> d, T* to) {
   StoreU(x.a, d.d, to);
   StoreU(x.b, d.d, to + Lanes(d.d));
+}
+template <class D, class V, class T>
+HWY_INLINE void Stream(Pair<V> x, Twice<D> d, T* to) {
+  Stream(x.a, d.d, to);
+  Stream(x.b, d.d, to + Lanes(d.d));
 }
 template <class D, class V>
 HWY_INLINE Vec<Twice<D>> BitCast(Twice<D> d, Pair<V> x) {

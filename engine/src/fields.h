@@ -1,0 +1,97 @@
+// Every column of a batch, declared once. The public tables (batch.h), the indices of a tile's columns and the
+// batch's columns by these indices are made from the lists here.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "facetwise/batch.h"
+
+namespace facetwise {
+
+// Sets of operations.
+namespace known_to {
+using enum Operation;
+inline constexpr unsigned kReflected = bit(sample_reflection);
+inline constexpr unsigned kScattered = bit(sample_transmission) | bit(sample_scattering);
+inline constexpr unsigned kSample = bit(sample_normal) | kReflected | kScattered;
+inline constexpr unsigned kSides = bit(evaluate_transmission) | bit(evaluate_scattering);
+inline constexpr unsigned kQuery = bit(pdf_reflection) | bit(evaluate_reflection) | bit(evaluate_and_pdf) | kSides;
+inline constexpr unsigned kMasking = bit(masking);
+inline constexpr unsigned kEvery = kSample | kQuery | kMasking;
+inline constexpr unsigned kReflectance = kReflected | bit(evaluate_reflection) | bit(evaluate_and_pdf);
+inline constexpr unsigned kDielectric = kReflectance | kScattered | kSides;
+inline constexpr unsigned kDirection = kReflected | kScattered;
+inline constexpr unsigned kDensity = kSample | bit(pdf_reflection) | bit(evaluate_and_pdf) | kSides;
+inline constexpr unsigned kValue = bit(evaluate_reflection) | bit(evaluate_and_pdf) | kSides;
+inline constexpr unsigned kEvent = bit(sample_scattering);
+inline constexpr unsigned kBranch = bit(sample_scattering) | bit(evaluate_scattering);
+}  // namespace known_to
+
+// X(index, member of Batch, operations that know it, what a missing column means)
+#define FACETWISE_INPUT_FIELDS(X)                         \
+  X(Ix, incident.x, kEvery, std::nullopt)                 \
+  X(Iy, incident.y, kEvery, std::nullopt)                 \
+  X(Iz, incident.z, kEvery, std::nullopt)                 \
+  X(AlphaX, alpha_x, kEvery, std::nullopt)                \
+  X(AlphaY, alpha_y, kEvery, std::nullopt)                \
+  X(MeanX, mean_slope_x, kEvery, 0.0f)                    \
+  X(MeanY, mean_slope_y, kEvery, 0.0f)                    \
+  X(Correlation, slope_correlation, kEvery, 0.0f)         \
+  X(Eta, eta, kDielectric, std::nullopt)                  \
+  X(F0, f0, kReflectance, std::nullopt)                   \
+  X(F90, f90, kReflectance, 1.0f)                         \
+  X(Ox, outgoing.x, kQuery, std::nullopt)                 \
+  X(Oy, outgoing.y, kQuery, std::nullopt)                 \
+  X(Oz, outgoing.z, kQuery, std::nullopt)                 \
+  X(U1, u1, kSample, std::nullopt)                        \
+  X(U2, u2, kSample, std::nullopt)                        \
+  X(U3, u3, kSample, std::nullopt)
+
+// X(index, member of Batch::out, operations that know it)
+#define FACETWISE_OUTPUT_FIELDS(X)                        \
+  X(Ox, outgoing.x, kDirection)                           \
+  X(Oy, outgoing.y, kDirection)                           \
+  X(Oz, outgoing.z, kDirection)                           \
+  X(Mx, normal.x, kSample)                                \
+  X(My, normal.y, kSample)                                \
+  X(Mz, normal.z, kSample)                                \
+  X(Im, incident_dot_normal, kSample)                     \
+  X(Pdf, pdf, kDensity)                                   \
+  X(Weight, weight, kDirection)                           \
+  X(Value, value, kValue)                                 \
+  X(Masking, masking, kMasking)                           \
+  X(Area, projected_area, kMasking)                       \
+  X(Share, share_unoccluded, kMasking)                    \
+  X(Branch, branch_probability, kBranch)                  \
+  X(EtaScale, eta_scale, kScattered)
+
+#define FACETWISE_BYTE_FIELDS(X)                          \
+  X(Status, status, kEvery)                               \
+  X(Event, event, kEvent)
+
+// kIx, ...; kOutOx, ...; kOutStatus, ...
+#define FACETWISE_INDEX(Name, ...) k##Name,
+enum InputIndex { FACETWISE_INPUT_FIELDS(FACETWISE_INDEX) kInputs };
+#undef FACETWISE_INDEX
+#define FACETWISE_INDEX(Name, ...) kOut##Name,
+enum OutputIndex { FACETWISE_OUTPUT_FIELDS(FACETWISE_INDEX) kOutputs };
+enum ByteIndex { FACETWISE_BYTE_FIELDS(FACETWISE_INDEX) kByteOutputs };
+#undef FACETWISE_INDEX
+
+// A batch's columns by these indices.
+struct BatchColumns {
+#define FACETWISE_COLUMN(Name, member, ...) &b.member,
+#define FACETWISE_OUTPUT_COLUMN(Name, member, ...) &b.out.member,
+  explicit BatchColumns(const Batch& b)
+      : in{FACETWISE_INPUT_FIELDS(FACETWISE_COLUMN)},
+        out{FACETWISE_OUTPUT_FIELDS(FACETWISE_OUTPUT_COLUMN)},
+        byte_out{FACETWISE_BYTE_FIELDS(FACETWISE_OUTPUT_COLUMN)} {}
+#undef FACETWISE_COLUMN
+#undef FACETWISE_OUTPUT_COLUMN
+  const Column<float>* in[kInputs];
+  const OutputColumn<float>* out[kOutputs];
+  const OutputColumn<std::uint8_t>* byte_out[kByteOutputs];
+};
+
+}  // namespace facetwise

@@ -1,0 +1,53 @@
+// A checked call and the kernel for it: all that is decided once, before the first lane.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "facetwise/batch.h"
+#include "src/fields.h"
+#include "src/tile.h"
+
+namespace facetwise {
+
+struct Plan {
+  const KernelTable* table = nullptr;
+  Kernel kernel = nullptr;
+  std::size_t positions = 0;  // lanes, or entries of the active list
+  const std::uint32_t* active = nullptr;
+  const Generator* generator = nullptr;
+  bool generates_u3 = false;
+  Tile tile;  // what is the same for every tile
+  // Lanes before most columns' first whole cache line. They are run by way of buffers, so that every later tile begins
+  // on a line: columns from malloc share one place in their lines.
+  std::size_t head = 0;
+  unsigned streamed = 0;  // Tile::streamed of tiles that begin at `head` or a multiple of kLine beyond
+  bool buffers = false;   // some column goes by way of buffers in every tile
+
+  // The columns that there are, by the tile's indices.
+  struct Input {
+    std::size_t index;
+    const Column<float>* column;
+    bool contiguous;
+  };
+  struct OneValue {
+    std::size_t index;
+    float value;
+  };
+  struct Output {
+    std::size_t index;
+    const OutputColumn<float>* column;
+    bool contiguous;
+  };
+  Input per_lane[kInputs];
+  OneValue one_value[kInputs];
+  Output out[kOutputs];
+  std::size_t per_lane_count = 0, one_value_count = 0, out_count = 0;
+  const OutputColumn<std::uint8_t>* bytes[kByteOutputs];
+};
+
+// The batch is checked; it and `columns` live as long as the plan.
+void make_plan(Operation operation, const Batch& batch, const BatchColumns& columns, const KernelTable& table,
+               const Execution& execution, Plan& plan);
+
+}  // namespace facetwise

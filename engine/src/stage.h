@@ -1,0 +1,142 @@
+// Runs a range of a plan's lanes, tile by tile. Contiguous columns are used where they lie; the others, and lanes that
+// do not fill a vector, go by way of buffers.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "src/plan.h"
+
+namespace facetwise {
+
+// Lanes of a tile with buffers, which then stay in the first-level cache, and of one without.
+inline constexpr std::size_t kStaged = 512, kInPlace = 4096;
+static_assert(kStaged % kWidest == 0 && kInPlace % kWidest == 0 && kWidest % kLine == 0);
+
+class Stage {
+ public:
+  explicit Stage(const Plan& plan) : plan_(plan), tile_(plan.tile) {
+    const std::size_t filled = std::min((plan.positions + kWidest - 1) / kWidest * kWidest, kStaged);
+    for (std::size_t c = 0; c < plan.one_value_count; ++c) {
+      const auto& [k, value] = plan.one_value[c];
+      std::fill_n(in_[k], filled, value);
+      tile_.in[k] = in_[k];
+    }
+  }
+
+  // Runs the positions [begin, end) of the batch, or of its active list.
+  Statistics run(std::size_t begin, std::size_t end) {
+    Statistics statistics;
+    const std::size_t most = plan_.buffers ? kStaged : kInPlace;
+    while (begin < end) {
+      const bool head = begin < plan_.head;
+      std::size_t lanes = std::min(head ? plan_.head - begin : most, end - begin);
+      const bool whole = lanes >= kWidest && !head;
+      if (whole) lanes -= lanes % kWidest;
+      if (!whole) lanes = std::min(lanes, kStaged);
+      tile_.lanes = lanes;
+      const bool in_place = whole && !plan_.active;
+      load(begin, in_place);
+      if (plan_.generator) generate(begin);
+      const bool staged = point_outputs(begin, in_place);
+      plan_.kernel(tile_, statistics);
+      if (staged) store(begin);
+      begin += lanes;
+    }
+    return statistics;
+  }
+
+ private:
+  std::size_t lane_at(std::size_t position) const { return plan_.active ? plan_.active[position] : position; }
+  // The buffers are read up to the next whole vector: zeros, which make an invalid lane.
+  std::size_t padding() const { return (kWidest - tile_.lanes % kWidest) % kWidest; }
+
+  void load(std::size_t begin, bool in_place) {
+    for (std::size_t c = 0; c < plan_.per_lane_count; ++c) {
+      const auto& [k, column, contiguous] = plan_.per_lane[c];
+      if (in_place && contiguous) {
+        tile_.in[k] = column->data() + begin;
+        continue;
+      }
+      if (contiguous) {
+        std::copy_n(column->data() + begin, tile_.lanes, in_[k]);
+      } else {
+        for (std::size_t j = 0; j < tile_.lanes; ++j) in_[k][j] = (*column)[lane_at(begin + j)];
+      }
+      std::fill_n(in_[k] + tile_.lanes, padding(), 0.0f);
+      tile_.in[k] = in_[k];
+    }
+  }
+
+  void generate(std::size_t begin) {
+    const Generator& generator = *plan_.generator;
+    PhiloxTile philox{.lanes = tile_.lanes,
+                      .seed = generator.seed,
+                      .dimension = generator.dimension,
+                      .first_id = generator.first_id + begin};
+    if (generator.id.present() || plan_.active) {
+      for (std::size_t j = 0; j < tile_.lanes; ++j) {
+        const std::size_t lane = lane_at(begin + j);
+        id_[j] = generator.first_id + lane;
+        if (generator.id.present())  // 4-byte alignment is enough for a column
+          std::memcpy(&id_[j], reinterpret_cast<const char*>(generator.id.data()) + lane * generator.id.lane_stride(),
+                      sizeof id_[j]);
+      }
+      std::fill_n(id_ + tile_.lanes, padding(), 0);
+      philox.id = id_;
+    }
+    philox.u[0] = in_[kU1];
+    philox.u[1] = in_[kU2];
+    philox.u[2] = plan_.generates_u3 ? in_[kU3] : nullptr;
+    plan_.table->philox(philox);
+    for (const InputIndex k : {kU1, kU2, kU3}) tile_.in[k] = in_[k];
+  }
+
+  // Returns true if an output goes by way of a buffer.
+  bool point_outputs(std::size_t begin, bool in_place) {
+    bool staged = false;
+    tile_.streamed = in_place ? plan_.streamed : 0;
+    for (std::size_t c = 0; c < plan_.out_count; ++c) {
+      const auto& [k, column, contiguous] = plan_.out[c];
+      const bool direct = in_place && contiguous;
+      tile_.out[k] = direct ? column->data() + begin : out_[k];
+      staged |= !direct;
+    }
+    for (std::size_t k = 0; k < kByteOutputs; ++k) {
+      const OutputColumn<std::uint8_t>& column = *plan_.bytes[k];
+      if (!column.present()) continue;
+      const bool direct = in_place && column.stride() == 1;
+      (k == kOutStatus ? tile_.status : tile_.event) = direct ? column.data() + begin : bytes_[k];
+      staged |= !direct;
+    }
+    return staged;
+  }
+
+  void store(std::size_t begin) {
+    for (std::size_t c = 0; c < plan_.out_count; ++c) {
+      const auto& [k, column, contiguous] = plan_.out[c];
+      if (tile_.out[k] != out_[k]) continue;
+      if (contiguous) {
+        std::copy_n(out_[k], tile_.lanes, column->data() + begin);
+      } else {
+        for (std::size_t j = 0; j < tile_.lanes; ++j) (*column)[lane_at(begin + j)] = out_[k][j];
+      }
+    }
+    for (std::size_t k = 0; k < kByteOutputs; ++k) {
+      const OutputColumn<std::uint8_t>& column = *plan_.bytes[k];
+      if (!column.present() || (k == kOutStatus ? tile_.status : tile_.event) != bytes_[k]) continue;
+      for (std::size_t j = 0; j < tile_.lanes; ++j) column[lane_at(begin + j)] = bytes_[k][j];
+    }
+  }
+
+  const Plan& plan_;
+  Tile tile_;
+  alignas(64) float in_[kInputs][kStaged];
+  alignas(64) float out_[kOutputs][kStaged];
+  alignas(64) std::uint8_t bytes_[kByteOutputs][kStaged];
+  alignas(64) std::uint64_t id_[kStaged];
+};
+
+}  // namespace facetwise
