@@ -10,7 +10,7 @@
 
 namespace facetwise {
 absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Execution& execution) {
-  const BatchColumns columns(batch);
+  const PresentColumns columns(batch);
   if (auto status = check(operation, batch, columns); !status.ok()) return status;
   const auto target = resolve(execution.target);
   if (!target) {

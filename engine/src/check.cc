@@ -87,15 +87,15 @@ namespace {
 
 absl::Status check_inputs(Operation operation, const Batch& batch, const BatchColumns& columns) {
   const InputField* fields = input_fields().data();
+  const unsigned read_bits = inputs_read(operation, batch.model, batch.sampler);
   for (std::size_t k = 0; k < kInputs; ++k) {
     const Column<float>& column = *columns.in[k];
     const bool known = fields[k].operations & bit(operation);
     if (!known && !column.present()) continue;
     const absl::string_view field = view(fields[k].name);
-    const bool random = k >= kU1;
+    const bool random = kRandomInputs >> k & 1, read = read_bits >> k & 1;
     if (!column.present()) {
-      const bool needed = !fields[k].otherwise && !(random && batch.generator) &&
-                          reads(operation, batch.model, batch.sampler, static_cast<InputIndex>(k));
+      const bool needed = read && !fields[k].otherwise && !(random && batch.generator);
       if (!needed) continue;
       return invalid(field, random ? absl::StrCat("missing: ", view(name(batch.sampler)),
                                                   " needs it unless a generator is given")
@@ -103,7 +103,7 @@ absl::Status check_inputs(Operation operation, const Batch& batch, const BatchCo
     }
     if (!known) return invalid(field, absl::StrCat(view(name(operation)), " does not read it"));
     // A u3 that the sampler does not need does no harm.
-    if (!random && !reads(operation, batch.model, batch.sampler, static_cast<InputIndex>(k)))
+    if (!random && !read)
       return invalid(field, absl::StrCat("a ", view(name(batch.model.interface)), " interface does not read it"));
     if (random && batch.generator) return invalid("generator", absl::StrCat("given together with ", field));
     if (auto status = check_input(field, column, batch.lanes); !status.ok()) return status;
@@ -122,7 +122,7 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
     const absl::string_view field = view(fields[k].name);
     if (!(fields[k].operations & bit(operation)))
       return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
-    if (!computes(operation, batch.model, static_cast<OutputIndex>(k)))
+    if (!computes(operation, batch.model, fields[k]))
       return invalid(field, k == kOutShare ? "known in closed form for ggx with smith masking only"
                                            : "depends on the normal with vcavity masking");
     if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
@@ -143,59 +143,94 @@ struct Use {
   MemoryUse memory;
 };
 
-// Outputs first.
-struct Uses {
-  static constexpr std::size_t kMost = std::size_t{kOutputs} + kByteOutputs + kInputs + 2;
-  Use use[kMost];
-  std::size_t outputs = 0, all = 0;
-  void add(const std::string_view& field, const MemoryUse& memory) { use[all++] = {&field, memory}; }
-
-  // Nearly always nothing meets, which comparisons without branches find quickest.
-  bool any_meet() const {
-    bool meet = false;
-    for (std::size_t k = 0; k < outputs; ++k)
-      for (std::size_t j = k + 1; j < all; ++j) meet |= ranges_meet(use[k].memory, use[j].memory);
-    return meet;
-  }
-};
-
 absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
   static constexpr std::string_view kId = "generator.id", kActive = "active";
-  Uses uses;
+  Use outputs[std::size_t{kOutputs} + kByteOutputs], inputs[kInputs + 2];
+  std::size_t output_count = 0, input_count = 0;
   for (std::size_t k = 0; k < kOutputs; ++k)
-    if (columns.out[k]->present()) uses.add(output_fields()[k].name, memory_use(*columns.out[k]));
+    if (columns.out[k]->present()) outputs[output_count++] = {&output_fields()[k].name, memory_use(*columns.out[k])};
   for (std::size_t k = 0; k < kByteOutputs; ++k)
-    if (columns.byte_out[k]->present()) uses.add(byte_fields()[k].name, memory_use(*columns.byte_out[k]));
-  uses.outputs = uses.all;
+    if (columns.byte_out[k]->present())
+      outputs[output_count++] = {&byte_fields()[k].name, memory_use(*columns.byte_out[k])};
   for (std::size_t k = 0; k < kInputs; ++k)
-    if (columns.in[k]->present()) uses.add(input_fields()[k].name, memory_use(*columns.in[k]));
-  if (batch.generator && batch.generator->id.present()) uses.add(kId, memory_use(batch.generator->id));
-  if (batch.active) uses.add(kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4));
-  if (!uses.any_meet()) return absl::OkStatus();
+    if (columns.in[k]->present()) inputs[input_count++] = {&input_fields()[k].name, memory_use(*columns.in[k])};
+  if (batch.generator && batch.generator->id.present())
+    inputs[input_count++] = {&kId, memory_use(batch.generator->id)};
+  if (batch.active)
+    inputs[input_count++] = {&kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4)};
 
-  for (std::size_t k = 0; k < uses.outputs; ++k) {
-    const Use& output = uses.use[k];
-    for (std::size_t j = uses.outputs; j < uses.all; ++j) {
-      const Use& input = uses.use[j];
+  for (std::size_t k = 0; k < output_count; ++k) {
+    const Use& output = outputs[k];
+    for (const Use& input : std::span(inputs, input_count)) {
       const bool same_lanes = output.memory == input.memory && input.field != &kActive;
       if (!same_lanes && share_memory(output.memory, input.memory))
         return invalid(view(*output.field), absl::StrCat("overlaps ", view(*input.field),
                                                          ": an output may be an input's own lanes or separate memory"));
     }
-    for (std::size_t j = 0; j < k; ++j)
-      if (share_memory(output.memory, uses.use[j].memory))
-        return invalid(view(*output.field), absl::StrCat("overlaps ", view(*uses.use[j].field)));
+    for (const Use& other : std::span(outputs, k))
+      if (share_memory(output.memory, other.memory))
+        return invalid(view(*output.field), absl::StrCat("overlaps ", view(*other.field)));
   }
   return absl::OkStatus();
 }
 
+// True of nearly all calls, and then nothing is wrong with the columns: all are contiguous, of one value per lane (inputs
+// perhaps of one value for all), known to the call, aligned and apart. Decided with few branches, since every call
+// pays for it; where it is false the checks above find out what is wrong, if anything is.
+bool plainly_right(Operation operation, const Batch& batch, const PresentColumns& columns) {
+  if (batch.active || batch.lanes == 0 || (batch.generator && (!samples(operation) || batch.generator->id.present())))
+    return false;
+  unsigned read = inputs_read(operation, batch.model, batch.sampler);
+  if (batch.generator) read &= ~kRandomInputs;
+  if ((columns.in_bits & ~read) | (read & ~(columns.in_bits | kOptionalInputs)) |
+      (columns.out_bits & ~outputs_computed(operation, batch.model)) |
+      (columns.byte_out_bits & ~byte_outputs_computed(operation)))
+    return false;
+
+  const std::size_t lanes = batch.lanes, bytes = lanes * sizeof(float);
+  if (lanes > PTRDIFF_MAX / sizeof(float)) return false;
+  std::uintptr_t low[std::size_t{kInputs} + kOutputs + kByteOutputs], out[std::size_t{kOutputs} + kByteOutputs], wrong = 0;
+  std::size_t low_count = 0, out_count = 0;
+  const auto fits = [&](const auto& column, std::size_t width) -> std::uintptr_t {
+    const std::uintptr_t data = address(column.data());
+    wrong |= (column.count() ^ lanes) | (column.stride() ^ width) | (data & (width - 1)) |
+             std::uintptr_t{data - 1 > UINTPTR_MAX - 1 - bytes};
+    return data;
+  };
+  for (const auto& [index, column] : std::span(columns.in, columns.in_count)) {
+    if (column->one_value()) {
+      wrong |= address(column->data()) & (sizeof(float) - 1);
+      wrong |= std::uintptr_t{column->data() == nullptr};
+      low[low_count++] = address(column->data()) - (bytes - 1);
+    } else {
+      low[low_count++] = fits(*column, sizeof(float)) - (bytes - 1);
+    }
+  }
+  for (const auto& [index, column] : std::span(columns.out, columns.out_count))
+    out[out_count++] = fits(*column, sizeof(float));
+  for (const auto& [index, column] : std::span(columns.byte_out, columns.byte_out_count))
+    out[out_count++] = fits(*column, 1);
+
+  // Two columns meet if their distance is less than their length, as if byte columns and single values were as long as
+  // the others. `low` is where a column begins that ends with another's first byte.
+  std::size_t meetings = 0;
+  for (std::size_t k = 0; k < out_count; ++k) {
+#pragma GCC unroll 4
+    for (std::size_t j = 0; j < low_count; ++j) meetings += out[k] - low[j] < 2 * bytes - 1;
+    low[low_count++] = out[k] - (bytes - 1);
+  }
+  return wrong == 0 && meetings == 0;
+}
+
 }  // namespace
 
-absl::Status check(Operation operation, const Batch& batch) { return check(operation, batch, BatchColumns(batch)); }
+absl::Status check(Operation operation, const Batch& batch) { return check(operation, batch, PresentColumns(batch)); }
 
-absl::Status check(Operation operation, const Batch& batch, const BatchColumns& columns) {
+absl::Status check(Operation operation, const Batch& batch, const PresentColumns& present) {
   if (auto status = check_composition(operation, batch); !status.ok()) return status;
+  if (plainly_right(operation, batch, present)) return absl::OkStatus();
   if (auto status = check_active(batch.active, batch.lanes); !status.ok()) return status;
+  const BatchColumns columns(batch);
   if (auto status = check_inputs(operation, batch, columns); !status.ok()) return status;
   if (auto status = check_outputs(operation, batch, columns); !status.ok()) return status;
   return check_overlap(batch, columns);

@@ -38,7 +38,7 @@ template <class T>
 absl::Status check_input(absl::string_view field, const Column<T>& column, std::size_t lanes);
 template <class T>
 absl::Status check_output(absl::string_view field, const OutputColumn<T>& column, std::size_t lanes);
-absl::Status check(Operation operation, const Batch& batch, const BatchColumns& columns);
+absl::Status check(Operation operation, const Batch& batch, const PresentColumns& columns);
 absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& active, std::size_t lanes);
 
 }  // namespace facetwise

@@ -63,10 +63,6 @@ std::vector<Sampler> samplers_for(Operation operation, const Model& model, bool 
 
 }  // namespace
 
-bool is_affine(const Batch& batch) {
-  return batch.mean_slope_x.present() || batch.mean_slope_y.present() || batch.slope_correlation.present();
-}
-
 bool samples(Operation operation) {
   return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
          operation == Operation::sample_transmission || operation == Operation::sample_scattering;

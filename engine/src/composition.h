@@ -3,7 +3,6 @@
 
 #include "absl/status/status.h"
 #include "facetwise/batch.h"
-#include "src/fields.h"
 
 namespace facetwise {
 
@@ -11,11 +10,10 @@ namespace facetwise {
 absl::Status check_composition(Operation operation, const Batch& batch);
 
 // Whether mean slopes or correlated roughness are given.
-bool is_affine(const Batch& batch);
+inline bool is_affine(const Batch& batch) {
+  return batch.mean_slope_x.present() || batch.mean_slope_y.present() || batch.slope_correlation.present();
+}
 // Whether the operation draws random numbers.
 bool samples(Operation operation);
-// batch.h's, by the fields' indices.
-bool reads(Operation operation, const Model& model, Sampler sampler, InputIndex input);
-bool computes(Operation operation, const Model& model, OutputIndex output);
 
 }  // namespace facetwise

@@ -85,8 +85,10 @@ std::vector<Target> available_targets() {
 }
 
 std::optional<Target> resolve(Target target) {
+  static const Target best = available_targets().front();
+  if (target == Target::best) return best;
   for (const CompiledTarget& compiled : kCompiled)
-    if (has(compiled) && (target == Target::best || target == compiled.target)) return compiled.target;
+    if (has(compiled) && target == compiled.target) return target;
   return std::nullopt;
 }
 

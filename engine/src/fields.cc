@@ -1,7 +1,7 @@
 // The batch's columns as public tables, and which calls read and compute them.
 #include "src/fields.h"
 
-#include "src/composition.h"
+#include <array>
 
 namespace facetwise {
 namespace {
@@ -21,36 +21,61 @@ constexpr OutputField kOutputFields[] = {FACETWISE_OUTPUT_FIELDS(FACETWISE_FIELD
 constexpr ByteField kByteFields[] = {FACETWISE_BYTE_FIELDS(FACETWISE_FIELD)};
 #undef FACETWISE_FIELD
 
+constexpr std::size_t kOperations = static_cast<std::size_t>(Operation::evaluate_scattering) + 1;
+
+// Bits of the fields that each operation knows.
+template <class Field, std::size_t kCount>
+constexpr std::array<unsigned, kOperations> known_by_operation(const Field (&fields)[kCount]) {
+  std::array<unsigned, kOperations> known{};
+  for (std::size_t operation = 0; operation < kOperations; ++operation)
+    for (std::size_t k = 0; k < kCount; ++k)
+      if (fields[k].operations >> operation & 1) known[operation] |= 1u << k;
+  return known;
+}
+constexpr auto kKnownInputs = known_by_operation(kInputFields);
+constexpr auto kKnownOutputs = known_by_operation(kOutputFields);
+constexpr auto kKnownBytes = known_by_operation(kByteFields);
+
+constexpr unsigned optional_inputs() {
+  unsigned bits = 0;
+  for (std::size_t k = 0; k < kInputs; ++k)
+    if (kInputFields[k].otherwise) bits |= 1u << k;
+  return bits;
+}
+
 }  // namespace
+
+constinit const unsigned kOptionalInputs = optional_inputs();
 
 std::span<const InputField> input_fields() { return kInputFields; }
 std::span<const OutputField> output_fields() { return kOutputFields; }
 std::span<const ByteField> byte_fields() { return kByteFields; }
 
-bool reads(Operation operation, const Model& model, Sampler sampler, InputIndex input) {
-  if (!(kInputFields[input].operations & bit(operation))) return false;
-  switch (input) {
-    case kEta: return model.interface == Interface::dielectric;
-    case kF0:
-    case kF90: return model.interface == Interface::schlick;
-    case kU3: return operation == Operation::sample_scattering || uses_u3(model, sampler);
-    default: return true;
-  }
+unsigned inputs_read(Operation operation, const Model& model, Sampler sampler) {
+  unsigned bits = kKnownInputs[static_cast<std::size_t>(operation)];
+  if (model.interface != Interface::dielectric) bits &= ~(1u << kEta);
+  if (model.interface != Interface::schlick) bits &= ~(1u << kF0 | 1u << kF90);
+  if (operation != Operation::sample_scattering && !uses_u3(model, sampler)) bits &= ~(1u << kU3);
+  return bits;
 }
+
+unsigned outputs_computed(Operation operation, const Model& model) {
+  unsigned bits = kKnownOutputs[static_cast<std::size_t>(operation)];
+  if (model.distribution != Distribution::ggx || model.masking != Masking::smith) bits &= ~(1u << kOutShare);
+  if (model.masking != Masking::smith) bits &= ~(1u << kOutMasking);
+  return bits;
+}
+
+unsigned byte_outputs_computed(Operation operation) { return kKnownBytes[static_cast<std::size_t>(operation)]; }
 
 bool reads(Operation operation, const Model& model, Sampler sampler, const InputField& field) {
-  return reads(operation, model, sampler, static_cast<InputIndex>(&field - kInputFields));
+  return inputs_read(operation, model, sampler) >> (&field - kInputFields) & 1;
 }
-
-bool computes(Operation operation, const Model& model, OutputIndex output) {
-  if (!(kOutputFields[output].operations & bit(operation))) return false;
-  if (output == kOutShare) return model.distribution == Distribution::ggx && model.masking == Masking::smith;
-  if (output == kOutMasking) return model.masking == Masking::smith;
-  return true;
-}
-
 bool computes(Operation operation, const Model& model, const OutputField& field) {
-  return computes(operation, model, static_cast<OutputIndex>(&field - kOutputFields));
+  return outputs_computed(operation, model) >> (&field - kOutputFields) & 1;
+}
+bool computes(Operation operation, const ByteField& field) {
+  return byte_outputs_computed(operation) >> (&field - kByteFields) & 1;
 }
 
 Statistics& Statistics::operator+=(const Statistics& other) {

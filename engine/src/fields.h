@@ -94,4 +94,46 @@ struct BatchColumns {
   const OutputColumn<std::uint8_t>* byte_out[kByteOutputs];
 };
 
+// Those that are present, and as bits (1 << index).
+struct PresentColumns {
+  explicit PresentColumns(const Batch& b) {
+    const auto add = [](const auto& column, auto index, auto* list, unsigned& count, unsigned& bits) {
+      if (!column.present()) return;
+      list[count++] = {index, &column};
+      bits |= 1u << index;
+    };
+    // In locals, which stay in registers.
+    unsigned count = 0, bits = 0;
+#define FACETWISE_ADD(Name, member, ...) add(b.member, k##Name, in, count, bits);
+    FACETWISE_INPUT_FIELDS(FACETWISE_ADD)
+#undef FACETWISE_ADD
+    in_count = count, in_bits = bits, count = bits = 0;
+#define FACETWISE_ADD(Name, member, ...) add(b.out.member, kOut##Name, out, count, bits);
+    FACETWISE_OUTPUT_FIELDS(FACETWISE_ADD)
+#undef FACETWISE_ADD
+    out_count = count, out_bits = bits, count = bits = 0;
+#define FACETWISE_ADD(Name, member, ...) add(b.out.member, kOut##Name, byte_out, count, bits);
+    FACETWISE_BYTE_FIELDS(FACETWISE_ADD)
+#undef FACETWISE_ADD
+    byte_out_count = count, byte_out_bits = bits;
+  }
+  template <class Column, class Index>
+  struct Present {
+    Index index;
+    const Column* column;
+  };
+  Present<Column<float>, InputIndex> in[kInputs];
+  Present<OutputColumn<float>, OutputIndex> out[kOutputs];
+  Present<OutputColumn<std::uint8_t>, ByteIndex> byte_out[kByteOutputs];
+  unsigned in_count, out_count, byte_out_count;
+  unsigned in_bits, out_bits, byte_out_bits;
+};
+
+// Which columns a call reads, and which it can compute, as bits (1 << index). Those in kOptionalInputs may be missing.
+unsigned inputs_read(Operation operation, const Model& model, Sampler sampler);
+unsigned outputs_computed(Operation operation, const Model& model);
+unsigned byte_outputs_computed(Operation operation);
+extern const unsigned kOptionalInputs;
+inline constexpr unsigned kRandomInputs = 1u << kU1 | 1u << kU2 | 1u << kU3;
+
 }  // namespace facetwise

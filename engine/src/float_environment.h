@@ -13,7 +13,10 @@ namespace facetwise {
 class FloatEnvironment {
  public:
 #if defined(__x86_64__)
-  FloatEnvironment() : saved_(_mm_getcsr()) { _mm_setcsr(0x1F80); }  // nearest, no FTZ or DAZ, exceptions masked
+  FloatEnvironment() : saved_(_mm_getcsr()) {
+    constexpr unsigned kFlags = 0x3F, kIeee = 0x1F80;  // nearest, no FTZ or DAZ, exceptions masked
+    if ((saved_ & ~kFlags) != kIeee) _mm_setcsr(kIeee);
+  }
   ~FloatEnvironment() { _mm_setcsr(saved_); }
 #elif defined(__aarch64__)
   FloatEnvironment() {

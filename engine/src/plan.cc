@@ -1,6 +1,8 @@
 #include "src/plan.h"
 
 #include <algorithm>
+#include <bit>
+#include <span>
 
 #if defined(__linux__)
 #include <unistd.h>
@@ -55,7 +57,7 @@ bool streams(const Plan& plan, const Execution& execution) {
 
 }  // namespace
 
-void make_plan(Operation operation, const Batch& batch, const BatchColumns& columns, const KernelTable& table,
+void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const KernelTable& table,
                const Execution& execution, Plan& plan) {
   const Model& model = batch.model;
   plan.table = &table;
@@ -64,52 +66,53 @@ void make_plan(Operation operation, const Batch& batch, const BatchColumns& colu
   plan.active = batch.active ? batch.active->data() : nullptr;
   plan.positions = batch.active ? batch.active->size() : batch.lanes;
   plan.generator = batch.generator ? &*batch.generator : nullptr;
-  plan.generates_u3 = plan.generator && reads(operation, model, batch.sampler, kU3);
+  const unsigned read = inputs_read(operation, model, batch.sampler);
+  plan.generates_u3 = plan.generator && (read >> kU3 & 1);
   plan.buffers = plan.active || plan.generator;
-  for (std::size_t k = 0; k < kInputs; ++k) {
-    const Column<float>& column = *columns.in[k];
-    if (!column.present()) {
-      const bool needed = k == kF90 ? model.interface == Interface::schlick
-                                    : affine || model.distribution == Distribution::table;
-      if (const auto otherwise = input_fields()[k].otherwise; otherwise && needed)
-        plan.one_value[plan.one_value_count++] = {k, *otherwise};
-    } else if (column.one_value()) {
-      plan.one_value[plan.one_value_count++] = {k, *column.data()};
-    } else {
-      const bool contiguous = column.stride() == sizeof(float) && !plan.active;
-      plan.per_lane[plan.per_lane_count++] = {k, &column, contiguous};
-      plan.buffers |= !contiguous;
+  for (const auto& [index, column] : std::span(columns.in, columns.in_count)) {
+    if (column->one_value()) {
+      plan.one_value[plan.one_value_count++] = {index, *column->data()};
+      continue;
     }
+    const bool contiguous = column->stride() == sizeof(float) && !plan.active;
+    plan.per_lane[plan.per_lane_count++] = {index, column, contiguous};
+    plan.buffers |= !contiguous;
+  }
+  // Kernels of affine surfaces, and tables', read all moments.
+  constexpr unsigned kMoments = 1u << kMeanX | 1u << kMeanY | 1u << kCorrelation;
+  unsigned missing = read & kOptionalInputs & ~columns.in_bits;
+  if (!affine && model.distribution != Distribution::table) missing &= ~kMoments;
+  for (; missing != 0; missing &= missing - 1) {
+    const auto index = static_cast<unsigned>(std::countr_zero(missing));
+    plan.one_value[plan.one_value_count++] = {index, *input_fields()[index].otherwise};
   }
   plan.buffers |= plan.one_value_count > 0;
-  for (std::size_t k = 0; k < kOutputs; ++k) {
-    const OutputColumn<float>& column = *columns.out[k];
-    if (!column.present()) continue;
-    const bool contiguous = column.stride() == sizeof(float) && !plan.active;
-    plan.out[plan.out_count++] = {k, &column, contiguous};
+  for (const auto& [index, column] : std::span(columns.out, columns.out_count)) {
+    const bool contiguous = column->stride() == sizeof(float) && !plan.active;
+    plan.out[plan.out_count++] = {index, column, contiguous};
     plan.buffers |= !contiguous;
-    plan.tile.wanted |= bit(static_cast<OutputIndex>(k));
   }
-  for (std::size_t k = 0; k < kByteOutputs; ++k) {
-    plan.bytes[k] = columns.byte_out[k];
-    plan.buffers |= plan.bytes[k]->present() && plan.bytes[k]->stride() != 1;
+  plan.constants.wanted = columns.out_bits;
+  for (const auto& [index, column] : std::span(columns.byte_out, columns.byte_out_count)) {
+    plan.bytes[index] = column;
+    plan.buffers |= column->stride() != 1;
   }
-  plan.tile.normals_alone = operation == Operation::sample_normal;
-  plan.tile.transmits = operation == Operation::sample_transmission || operation == Operation::evaluate_transmission;
-  plan.tile.uncorrelated = model.shadowing == Shadowing::uncorrelated;
-  plan.tile.biased = model.normalisation == Normalisation::biased && operation != Operation::masking;
-  plan.tile.importance = model.transport == Transport::importance;
-  plan.tile.retro = model.retro;
+  plan.constants.normals_alone = operation == Operation::sample_normal;
+  plan.constants.transmits = operation == Operation::sample_transmission || operation == Operation::evaluate_transmission;
+  plan.constants.uncorrelated = model.shadowing == Shadowing::uncorrelated;
+  plan.constants.biased = model.normalisation == Normalisation::biased && operation != Operation::masking;
+  plan.constants.importance = model.transport == Transport::importance;
+  plan.constants.retro = model.retro;
   // Operations without reflectances do not read its columns.
-  if (known_to::kDielectric & bit(operation)) plan.tile.interface = model.interface;
-  plan.tile.table = model.table ? &model.table->view() : nullptr;
+  if (known_to::kDielectric & bit(operation)) plan.constants.interface = model.interface;
+  plan.constants.table = model.table ? &model.table->view() : nullptr;
 
   if (plan.active || plan.positions < kLanesWorthHead) return;
   plan.head = best_head(plan);
   if (!streams(plan, execution)) return;
   for (std::size_t c = 0; c < plan.out_count; ++c) {
-    const auto& [k, column, contiguous] = plan.out[c];
-    if (contiguous && lanes_to_line(column->data()) == plan.head) plan.streamed |= bit(static_cast<OutputIndex>(k));
+    const auto& [index, column, contiguous] = plan.out[c];
+    if (contiguous && lanes_to_line(column->data()) == plan.head) plan.streamed |= 1u << index;
   }
 }
 

@@ -17,7 +17,7 @@ struct Plan {
   const std::uint32_t* active = nullptr;
   const Generator* generator = nullptr;
   bool generates_u3 = false;
-  Tile tile;  // what is the same for every tile
+  TileConstants constants;
   // Lanes before most columns' first whole cache line. They are run by way of buffers, so that every later tile begins
   // on a line: columns from malloc share one place in their lines.
   std::size_t head = 0;
@@ -26,16 +26,16 @@ struct Plan {
 
   // The columns that there are, by the tile's indices.
   struct Input {
-    std::size_t index;
+    unsigned index;
     const Column<float>* column;
     bool contiguous;
   };
   struct OneValue {
-    std::size_t index;
+    unsigned index;
     float value;
   };
   struct Output {
-    std::size_t index;
+    unsigned index;
     const OutputColumn<float>* column;
     bool contiguous;
   };
@@ -43,11 +43,11 @@ struct Plan {
   OneValue one_value[kInputs];
   Output out[kOutputs];
   std::size_t per_lane_count = 0, one_value_count = 0, out_count = 0;
-  const OutputColumn<std::uint8_t>* bytes[kByteOutputs];
+  const OutputColumn<std::uint8_t>* bytes[kByteOutputs] = {};  // null: absent
 };
 
 // The batch is checked; it and `columns` live as long as the plan.
-void make_plan(Operation operation, const Batch& batch, const BatchColumns& columns, const KernelTable& table,
+void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const KernelTable& table,
                const Execution& execution, Plan& plan);
 
 }  // namespace facetwise

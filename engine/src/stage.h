@@ -17,7 +17,7 @@ static_assert(kStaged % kWidest == 0 && kInPlace % kWidest == 0 && kWidest % kLi
 
 class Stage {
  public:
-  explicit Stage(const Plan& plan) : plan_(plan), tile_(plan.tile) {
+  explicit Stage(const Plan& plan) : plan_(plan), tile_(plan.constants) {
     const std::size_t filled = std::min((plan.positions + kWidest - 1) / kWidest * kWidest, kStaged);
     for (std::size_t c = 0; c < plan.one_value_count; ++c) {
       const auto& [k, value] = plan.one_value[c];
@@ -105,8 +105,8 @@ class Stage {
       staged |= !direct;
     }
     for (std::size_t k = 0; k < kByteOutputs; ++k) {
+      if (plan_.bytes[k] == nullptr) continue;
       const OutputColumn<std::uint8_t>& column = *plan_.bytes[k];
-      if (!column.present()) continue;
       const bool direct = in_place && column.stride() == 1;
       (k == kOutStatus ? tile_.status : tile_.event) = direct ? column.data() + begin : bytes_[k];
       staged |= !direct;
@@ -125,9 +125,8 @@ class Stage {
       }
     }
     for (std::size_t k = 0; k < kByteOutputs; ++k) {
-      const OutputColumn<std::uint8_t>& column = *plan_.bytes[k];
-      if (!column.present() || (k == kOutStatus ? tile_.status : tile_.event) != bytes_[k]) continue;
-      for (std::size_t j = 0; j < tile_.lanes; ++j) column[lane_at(begin + j)] = bytes_[k][j];
+      if (plan_.bytes[k] == nullptr || (k == kOutStatus ? tile_.status : tile_.event) != bytes_[k]) continue;
+      for (std::size_t j = 0; j < tile_.lanes; ++j) (*plan_.bytes[k])[lane_at(begin + j)] = bytes_[k][j];
     }
   }
 

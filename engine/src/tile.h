@@ -25,15 +25,9 @@ inline constexpr unsigned kWantsPdf = bit(kOutPdf), kWantsWeight = bit(kOutWeigh
 // written up to the next multiple of it.
 inline constexpr std::size_t kWidest = 32;
 
-struct Tile {
-  std::size_t lanes = 0;
-  const float* in[kInputs] = {};   // those that the operation reads, the optional ones too
-  float* out[kOutputs] = {};       // the wanted ones
-  std::uint8_t* status = nullptr;  // null unless wanted
-  std::uint8_t* event = nullptr;   // likewise
+// What is the same for every tile of a call, and too small to compile kernels apart for.
+struct TileConstants {
   unsigned wanted = 0;             // bit(OutputIndex): what is computed and stored
-  unsigned streamed = 0;           // the same: stored past the caches; those begin at a cache line
-  // What is the same for all lanes and too small to compile kernels apart for.
   bool normals_alone = false;      // sample_normal
   bool transmits = false;          // *_transmission, of the kernels that also serve *_scattering
   bool uncorrelated = false;       // Shadowing::uncorrelated
@@ -42,6 +36,17 @@ struct Tile {
   bool retro = false;
   Interface interface = Interface::conductor;
   const SlopeTableView* table = nullptr;
+};
+
+// Pointers that are neither read nor wanted are not set: every call pays for what is.
+struct Tile : TileConstants {
+  explicit Tile(const TileConstants& constants) : TileConstants(constants) {}
+  std::size_t lanes = 0;
+  unsigned streamed = 0;           // as `wanted`: stored past the caches; those begin at a cache line
+  std::uint8_t* status = nullptr;  // null unless wanted
+  std::uint8_t* event = nullptr;   // likewise
+  const float* in[kInputs];        // those that the operation reads, the optional ones too
+  float* out[kOutputs];            // the wanted ones
 };
 
 // Adds the tile's lanes that are not accepted to the statistics.

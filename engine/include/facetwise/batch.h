@@ -157,6 +157,7 @@ bool reads(Operation, const Model&, Sampler, const InputField&);
 // Whether an operation computes a field for a model: share_unoccluded is known for GGX with Smith alone, and
 // V-cavity's masking depends on m.
 bool computes(Operation, const Model&, const OutputField&);
+bool computes(Operation, const ByteField&);
 constexpr unsigned bit(Operation operation) { return 1u << static_cast<unsigned>(operation); }
 
 }  // namespace facetwise
