@@ -21,8 +21,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array kImplementations = {"scalar", "one-lane", "simd", "simd-threads", "remote"};
-enum Implementation { kScalar, kOneLane, kSimd, kThreads, kRemote, kCount };
+constexpr std::array kImplementations = {"scalar", "auto", "one-lane", "simd", "simd-threads", "remote"};
+enum Implementation { kScalar, kAuto, kOneLane, kSimd, kThreads, kRemote, kCount };
 
 absl::StatusOr<Json> read_json(const std::string& path) {
   std::ifstream file(path);
@@ -61,8 +61,9 @@ struct Table {
       const auto found =
           std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
       if (found == kImplementations.end() || result.value("inputs", "columns") != "columns") continue;
-      const Json& alpha = result.at("alpha");
-      Row& row = group(result.at("operation"), sampler_name(result)).by_alpha[{alpha.at(0), alpha.at(1)}];
+      const Json& alpha = result.at("alpha");  // or "mixed"
+      const auto key = alpha.is_array() ? std::pair<double, double>(alpha.at(0), alpha.at(1)) : std::pair(0.0, 0.0);
+      Row& row = group(result.at("operation"), sampler_name(result)).by_alpha[key];
       double& rate = row.rate[static_cast<std::size_t>(found - kImplementations.begin())];
       rate = std::max(rate, result.at("samples_per_second").get<double>());
     }
@@ -75,9 +76,9 @@ struct Table {
   }
 
   void print() const {
-    constexpr const char* kLine = "  {:<20} {:<24} {:>9} {:>7} {:>9} {:>7} {:>8} {:>7} {:>12} {:>13} {:>12}\n";
+    constexpr const char* kLine = "  {:<20} {:<25} {:>9} {:>7} {:>7} {:>9} {:>7} {:>8} {:>7} {:>12} {:>13} {:>12}\n";
     fmt::print("\nThroughput, million samples a second, each at its best batch size\n");
-    fmt::print(kLine, "operation", "sampler", "alpha", "scalar", "one lane", "SIMD", "threads", "remote",
+    fmt::print(kLine, "operation", "sampler", "alpha", "scalar", "auto", "one lane", "SIMD", "threads", "remote",
                "SIMD/scalar", "threads/SIMD", "remote/SIMD");
     for (const Group& group : groups) {
       // The roughness that most implementations were measured at.
@@ -85,8 +86,8 @@ struct Table {
           group.by_alpha.begin(), group.by_alpha.end(),
           [](const auto& a, const auto& b) { return a.second.measured() < b.second.measured(); });
       const auto& rate = row.rate;
-      fmt::print(kLine, group.operation, group.sampler, fmt::format("{}, {}", alpha.first, alpha.second),
-                 millions(rate[kScalar]), millions(rate[kOneLane]), millions(rate[kSimd]),
+      fmt::print(kLine, group.operation, group.sampler, alpha_text(alpha.first, alpha.second),
+                 millions(rate[kScalar]), millions(rate[kAuto]), millions(rate[kOneLane]), millions(rate[kSimd]),
                  millions(rate[kThreads]), millions(rate[kRemote]), ratio(rate[kSimd], rate[kScalar]),
                  ratio(rate[kThreads], rate[kSimd]), ratio(rate[kRemote], rate[kSimd]));
     }

@@ -7,18 +7,22 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "facetwise/baseline.h"
+#include "bench/baseline/baseline.h"
+#include "runner.h"
 
 namespace facetwise::bench {
 namespace {
 
 constexpr std::size_t kBatches[] = {256, 4096, 65536, std::size_t{1} << 20, std::size_t{1} << 24};
-constexpr std::size_t kBatch = 65536;
-constexpr std::pair<float, float> kAlphas[] = {{0.3f, 0.3f}, {0.8f, 0.1f}, {0.01f, 0.01f}, {1.0f, 1.0f}};
-constexpr Implementation kImplementations[] = {Implementation::scalar, Implementation::one_lane,
-                                               Implementation::simd, Implementation::simd_threads,
-                                               Implementation::remote};
+constexpr std::size_t kBatch = 65536, kLargestBatch = std::size_t{1} << 24;
+// Mixed roughness first (Case).
+constexpr std::pair<float, float> kAlphas[] = {{0, 0}, {0.3f, 0.3f}, {0.8f, 0.1f}, {0.01f, 0.01f}, {1.0f, 1.0f}};
+constexpr Implementation kImplementations[] = {Implementation::scalar, Implementation::auto_vectorised,
+                                               Implementation::one_lane, Implementation::simd,
+                                               Implementation::simd_threads, Implementation::remote};
 constexpr Sampler kReflectionSamplers[] = {Sampler::bounded, Sampler::exact};
+// Those whose speed in memory is shown: the simplest, and facetwise's own.
+constexpr Sampler kMemorySamplers[] = {Sampler::cap, Sampler::exact};
 // GGX's with Smith masking: `visible` is `cap`.
 constexpr Sampler kGgxSamplers[] = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact};
 
@@ -37,6 +41,11 @@ bool has_baseline(const Case& which) {
          (which.operation != Operation::masking || which.masking == Masking::smith);
 }
 
+// One roughness for all lanes and generated numbers are not in its loops.
+bool has_auto(const Case& which) {
+  return which.is_ggx_smith() && has_baseline(which) && which.inputs != Inputs::one_roughness;
+}
+
 class List {
  public:
   // Every implementation that can run `which`.
@@ -44,6 +53,7 @@ class List {
     for (const Implementation implementation : kImplementations) {
       which.implementation = implementation;
       if (implementation == Implementation::scalar && !has_baseline(which)) continue;
+      if (implementation == Implementation::auto_vectorised && !has_auto(which)) continue;
       cases_.push_back(which);
     }
   }
@@ -101,22 +111,29 @@ void add_shown_models(List& list, float alpha_x, float alpha_y) {
 std::vector<Case> quick_cases() {
   List list;
   for (const Sampler sampler : kGgxSamplers) list.add({.sampler = sampler});
-  for (const Sampler sampler : kReflectionSamplers)
-    list.add({.sampler = sampler, .alpha_x = 0.8f, .alpha_y = 0.1f});
-  add_shown_models(list, 0.3f, 0.3f);
+  for (int k = 1; k < 3; ++k)
+    for (const Sampler sampler : kReflectionSamplers)
+      list.add({.sampler = sampler, .alpha_x = kAlphas[k].first, .alpha_y = kAlphas[k].second});
+  add_shown_models(list, kAlphas[0].first, kAlphas[0].second);
   return list.take();
 }
 
 std::vector<Case> standard_cases() {
   List list;
-  for (int k = 0; k < 2; ++k)
+  for (int k = 0; k < 3; ++k)
     for (const Sampler sampler : kGgxSamplers)
       list.add({.sampler = sampler, .alpha_x = kAlphas[k].first, .alpha_y = kAlphas[k].second});
-  for (const Sampler sampler : kReflectionSamplers)
+  for (const Sampler sampler : kMemorySamplers)
     for (const std::size_t batch : kBatches)
       if (batch != kBatch) list.add({.sampler = sampler, .batch = batch});
+  for (const std::size_t batch : {kBatch, kLargestBatch})
+    for (const Sampler sampler : kMemorySamplers)
+      list.add({.sampler = sampler, .batch = batch, .inputs = Inputs::malloc_placed});
+  for (const Sampler sampler : kMemorySamplers)
+    list.add({.sampler = sampler, .batch = std::size_t{1} << 20, .inputs = Inputs::fresh});
   for (const Inputs inputs : {Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
-    for (const Sampler sampler : kReflectionSamplers) list.add({.sampler = sampler, .inputs = inputs});
+    for (const Sampler sampler : kReflectionSamplers)
+      list.add({.sampler = sampler, .alpha_x = kAlphas[1].first, .alpha_y = kAlphas[1].second, .inputs = inputs});
   constexpr Sampler kNormals[] = {Sampler::cap};
   for (const Case& which : operations(kReflectionSamplers, kNormals)) list.add(which);
   for (int k = 0; k < 2; ++k) add_shown_models(list, kAlphas[k].first, kAlphas[k].second);
@@ -135,10 +152,15 @@ std::vector<Case> all_cases() {
   for (const std::size_t batch : kBatches) {
     for (const auto& [alpha_x, alpha_y] : kAlphas) {
       for (const Inputs inputs :
-           {Inputs::columns, Inputs::one_roughness, Inputs::generator, Inputs::backfacing})
+           {Inputs::columns, Inputs::malloc_placed, Inputs::fresh, Inputs::one_roughness, Inputs::generator,
+            Inputs::backfacing}) {
+        // There is no one mixed roughness, and the largest batch is fresh as it is.
+        if (inputs == Inputs::one_roughness && alpha_x == 0) continue;
+        if (inputs == Inputs::fresh && batch == kLargestBatch) continue;
         for (const Sampler sampler : kGgxSamplers)
           list.add(
               {.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
+      }
       for (Case which : operations(kGgxSamplers, kNormals)) {
         which.alpha_x = alpha_x;
         which.alpha_y = alpha_y;
@@ -162,6 +184,8 @@ std::string_view name(Implementation implementation) {
   switch (implementation) {
     case Implementation::scalar:
       return "scalar";
+    case Implementation::auto_vectorised:
+      return "auto";
     case Implementation::one_lane:
       return "one-lane";
     case Implementation::simd:
@@ -178,6 +202,10 @@ std::string_view name(Inputs inputs) {
   switch (inputs) {
     case Inputs::columns:
       return "columns";
+    case Inputs::malloc_placed:
+      return "malloc";
+    case Inputs::fresh:
+      return "fresh";
     case Inputs::one_roughness:
       return "one-roughness";
     case Inputs::generator:
@@ -247,18 +275,21 @@ absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options) {
     cases = standard_cases();
   if (options.remote == nullptr)
     std::erase_if(cases, [](const Case& which) { return which.implementation == Implementation::remote; });
+  const Target target = resolve(options.target).value_or(Target::scalar);
+  if (!has_auto_loops(target))
+    std::erase_if(cases, [](const Case& which) { return which.implementation == Implementation::auto_vectorised; });
   std::erase_if(cases, [&](const Case& which) { return !RE2::PartialMatch(describe(which).name(), filter); });
   if (cases.empty())
     return absl::InvalidArgumentError(
         absl::StrCat("filter: \"", options.filter, "\" matches none of the benchmarks, whose names are like ",
-                     "\"sample_reflection/bounded/0.3,0.3/65536/simd\"",
+                     "\"sample_reflection/bounded/mixed/65536/simd\"",
                      options.remote == nullptr ? " (and /remote only where a server is given)" : ""));
   return cases;
 }
 
 int flops(const Case& which) {
   if (!which.is_ggx_smith() || which.scatters()) return 0;
-  const bool isotropic = which.alpha_x == which.alpha_y;
+  const bool isotropic = which.alpha_x == which.alpha_y && !which.is_mixed();
   constexpr int kLength = 6, kPrepare = 9, kSinCos = 19, kReflect = 8, kBound = 20, kShadowing = 17;
   const int cone = isotropic ? 28 : 80;
   if (which.operation == Operation::masking) return kLength + kPrepare + 2;

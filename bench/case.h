@@ -11,19 +11,23 @@
 
 namespace facetwise::bench {
 
-enum class Implementation { scalar, one_lane, simd, simd_threads, remote };
+enum class Implementation { scalar, auto_vectorised, one_lane, simd, simd_threads, remote };
 // BenchResult::inputs says what they are.
-enum class Inputs { columns, one_roughness, generator, backfacing };
+enum class Inputs { columns, malloc_placed, fresh, one_roughness, generator, backfacing };
 
 std::string_view name(Implementation);
 std::string_view name(Inputs);
 
+// Lanes that a stream of fresh columns goes through before it comes back to the first: far beyond every cache.
+inline constexpr std::size_t kFreshLanes = std::size_t{1} << 24;
+
+// Roughness that differs from lane to lane, evenly spread over [0.05, 1]^2, is alpha_x = alpha_y = 0 here.
 struct Case {
   Operation operation = Operation::sample_reflection;
   Distribution distribution = Distribution::ggx;
   Masking masking = Masking::smith;
   std::optional<Sampler> sampler;  // nothing where the operation has no use for one
-  float alpha_x = 0.3f, alpha_y = 0.3f;
+  float alpha_x = 0, alpha_y = 0;
   std::size_t batch = 65536;
   Implementation implementation = Implementation::simd;
   Inputs inputs = Inputs::columns;
@@ -34,6 +38,9 @@ struct Case {
   }
   // Of a dielectric; the others' interface is a conductor.
   bool scatters() const { return operation >= Operation::sample_transmission; }
+  bool is_mixed() const { return alpha_x == 0; }
+  // Lanes of the columns that it goes through.
+  std::size_t lanes() const { return inputs == Inputs::fresh ? kFreshLanes : batch; }
   bool is_ggx_smith() const { return distribution == Distribution::ggx && masking == Masking::smith; }
   Model model() const {
     return {.distribution = distribution,

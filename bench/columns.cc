@@ -33,18 +33,29 @@ std::uint64_t available_memory() {
 
 }  // namespace
 
-absl::StatusOr<Columns> Columns::make(std::size_t lanes) {
+void Columns::Memory::allocate() {
+  data.reset(new (std::align_val_t{4096}) float[offset + (kInputs + kOutputs) * stride]());
+}
+
+absl::StatusOr<Columns> Columns::make(std::size_t lanes, std::size_t malloc_lanes) {
   Columns columns;
-  columns.lanes_ = lanes;
   // Five cache lines between columns, so that the same lane of two columns is never at the same place of a
   // page.
-  columns.stride_ = (lanes + 15) / 16 * 16 + 80;
-  const std::uint64_t bytes = (kInputs + kOutputs) * columns.stride_ * sizeof(float);
+  columns.kind_.lanes = lanes;
+  columns.kind_.stride = (lanes + 15) / 16 * 16 + 80;
+  // Large pieces of memory from malloc are whole pages of which it takes the first 16 bytes itself.
+  constexpr std::size_t kPage = 4096 / sizeof(float);
+  columns.malloc_.lanes = malloc_lanes;
+  columns.malloc_.offset = 4;
+  columns.malloc_.stride = malloc_lanes == 0 ? 0 : (malloc_lanes + 4 + kPage - 1) / kPage * kPage;
+  const std::uint64_t bytes =
+      (kInputs + kOutputs) * (columns.kind_.stride + columns.malloc_.stride) * sizeof(float);
   if (bytes > available_memory() / 10 * 9)
     return absl::ResourceExhaustedError(absl::StrCat("batch: columns of ", lanes, " lanes take ", bytes >> 20,
                                                      " MiB, more than this machine has free; filter for "
                                                      "smaller batches"));
-  columns.data_.reset(new (std::align_val_t{64}) float[(kInputs + kOutputs) * columns.stride_]());
+  columns.kind_.allocate();
+  columns.malloc_.allocate();
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     const float z = std::max(uniform(lane, 0), 0x1p-24f);
     const float r = std::sqrt((1 - z) * (1 + z));
@@ -64,14 +75,17 @@ void Columns::set_roughness(float alpha_x, float alpha_y, std::size_t lanes) {
   if (alpha_x != alpha_x_ || alpha_y != alpha_y_) rough_lanes_ = query_lanes_ = 0;
   alpha_x_ = alpha_x;
   alpha_y_ = alpha_y;
-  if (rough_lanes_ >= lanes) return;
-  std::fill_n(input(kAlphaX), lanes, alpha_x);
-  std::fill_n(input(kAlphaY), lanes, alpha_y);
-  rough_lanes_ = lanes;
+  for (std::size_t lane = rough_lanes_; lane < lanes; ++lane) {
+    input(kAlphaX)[lane] = alpha_x > 0 ? alpha_x : 0.05f + 0.95f * uniform(lane, 6);
+    input(kAlphaY)[lane] = alpha_y > 0 ? alpha_y : 0.05f + 0.95f * uniform(lane, 7);
+  }
+  rough_lanes_ = std::max(rough_lanes_, lanes);
 }
 
 absl::Status Columns::prepare(const Case& which) {
-  set_roughness(which.alpha_x, which.alpha_y, which.batch);
+  set_roughness(which.alpha_x, which.alpha_y, which.lanes());
+  if (which.inputs == Inputs::malloc_placed)
+    for (int k = 0; k < kInputs; ++k) std::copy_n(kind_.column(k), which.batch, malloc_.column(k));
   if (which.is_sampling() || which.operation == Operation::masking) return absl::OkStatus();
   const std::size_t lanes = which.batch;
   const Case drawing{.operation = which.operation == Operation::evaluate_transmission ? Operation::sample_transmission
@@ -95,19 +109,11 @@ absl::Status Columns::prepare(const Case& which) {
   return absl::OkStatus();
 }
 
-void Columns::set_mixed_roughness(std::size_t lanes) {
-  for (std::size_t lane = 0; lane < lanes; ++lane) {
-    input(kAlphaX)[lane] = 0.05f + 0.95f * uniform(lane, 6);
-    input(kAlphaY)[lane] = 0.05f + 0.95f * uniform(lane, 7);
-  }
-  alpha_x_ = alpha_y_ = 0;
-  rough_lanes_ = query_lanes_ = 0;
-}
-
-Batch Columns::batch(const Case& which) const {
+Batch Columns::batch(const Case& which, std::size_t first) const {
   const std::size_t lanes = which.batch;
-  const auto in = [&](Index index) { return Column<float>(input(index), lanes); };
-  const auto out = [&](int index) { return OutputColumn<float>(output(index), lanes); };
+  const Memory& memory = which.inputs == Inputs::malloc_placed ? malloc_ : kind_;
+  const auto in = [&](Index index) { return Column<float>(memory.column(index) + first, lanes); };
+  const auto out = [&](int index) { return OutputColumn<float>(memory.column(kInputs + index) + first, lanes); };
   Batch batch;
   batch.lanes = lanes;
   batch.model = which.model();

@@ -19,7 +19,7 @@ Json to_json(const BenchResult& r) {
       {"distribution", r.distribution},
       {"masking", r.masking},
       {"sampler", r.sampler},
-      {"alpha", {r.alpha_x, r.alpha_y}},
+      {"alpha", r.alpha_x == 0 ? Json(alpha_text(0, 0)) : Json({r.alpha_x, r.alpha_y})},
       {"implementation", r.implementation},
       {"batch", r.batch},
       {"ns_per_sample", r.ns_per_sample},

@@ -24,8 +24,8 @@ struct Copy {
   CopyOrder order;
 
   void run(std::size_t begin, std::size_t end) const {
-    if (order == CopyOrder::side_by_side) {
-      copy_columns(target, inputs, input_count, outputs, output_count, begin, end);
+    if (order != CopyOrder::one_by_one) {
+      copy_columns(target, inputs, input_count, outputs, output_count, begin, end, order == CopyOrder::streaming);
       return;
     }
     for (int k = 0; k < output_count; ++k)

@@ -3,6 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bench/peak.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
+#include "hwy/cache_control.h"
 #include "hwy/highway.h"
 
 #ifndef FACETWISE_BENCH_PEAK_TABLE_
@@ -10,7 +11,7 @@
 namespace facetwise::bench {
 struct PeakTable {
   std::uint64_t (*multiply_add)(std::uint64_t, float&);
-  void (*copy_columns)(const float* const*, int, float* const*, int, std::size_t, std::size_t);
+  void (*copy_columns)(const float* const*, int, float* const*, int, std::size_t, std::size_t, bool);
   float (*read_column)(const float*, std::size_t, std::size_t);
 };
 }  // namespace facetwise::bench
@@ -48,40 +49,57 @@ std::uint64_t MultiplyAdd(std::uint64_t rounds, float& sink) {
   return rounds * 12 * 2 * hn::Lanes(d);
 }
 
-// Fixed numbers of columns, so that a vector of each is all that an iteration does.
-template <int kInputs, int kOutputs>
-void CopyFixed(const float* const* inputs, float* const* outputs, std::size_t begin, std::size_t end) {
-  const hn::ScalableTag<float> d;
-  for (std::size_t lane = begin; lane < end; lane += hn::Lanes(d)) {
-    for (int k = 0; k < kOutputs - 1; ++k) hn::StoreU(hn::LoadU(d, inputs[k] + lane), d, outputs[k] + lane);
-    auto sum = hn::LoadU(d, inputs[kOutputs - 1] + lane);
-    for (int k = kOutputs; k < kInputs; ++k) sum = sum + hn::LoadU(d, inputs[k] + lane);
-    hn::StoreU(sum, d, outputs[kOutputs - 1] + lane);
+template <bool kStreaming, class D, class V>
+HWY_INLINE void Put(V v, D d, float* to) {
+  if constexpr (kStreaming && HWY_ARCH_X86 && hn::MaxLanes(D()) >= 8) {
+    hn::Stream(v, d, to);
+  } else {
+    hn::StoreU(v, d, to);
   }
 }
 
-void CopyColumns(const float* const* inputs, int input_count, float* const* outputs, int output_count,
-                 std::size_t begin, std::size_t end) {
+// Fixed numbers of columns, so that a vector of each is all that an iteration does.
+template <int kInputs, int kOutputs, bool kStreaming>
+void CopyFixed(const float* const* inputs, float* const* outputs, std::size_t begin, std::size_t end) {
+  const hn::ScalableTag<float> d;
+  for (std::size_t lane = begin; lane < end; lane += hn::Lanes(d)) {
+    for (int k = 0; k < kOutputs - 1; ++k) Put<kStreaming>(hn::LoadU(d, inputs[k] + lane), d, outputs[k] + lane);
+    auto sum = hn::LoadU(d, inputs[kOutputs - 1] + lane);
+    for (int k = kOutputs; k < kInputs; ++k) sum = sum + hn::LoadU(d, inputs[k] + lane);
+    Put<kStreaming>(sum, d, outputs[kOutputs - 1] + lane);
+  }
+}
+
+template <bool kStreaming>
+void CopyColumnsBy(const float* const* inputs, int input_count, float* const* outputs, int output_count,
+                   std::size_t begin, std::size_t end) {
   const auto shape = [&](int in, int out) HWY_ATTR { return input_count == in && output_count == out; };
-  if (shape(5, 4)) return CopyFixed<5, 4>(inputs, outputs, begin, end);
-  if (shape(6, 4)) return CopyFixed<6, 4>(inputs, outputs, begin, end);
-  if (shape(7, 4)) return CopyFixed<7, 4>(inputs, outputs, begin, end);
-  if (shape(8, 4)) return CopyFixed<8, 4>(inputs, outputs, begin, end);
-  if (shape(8, 2)) return CopyFixed<8, 2>(inputs, outputs, begin, end);
-  if (shape(8, 1)) return CopyFixed<8, 1>(inputs, outputs, begin, end);
-  if (shape(5, 1)) return CopyFixed<5, 1>(inputs, outputs, begin, end);
+  if (shape(5, 4)) return CopyFixed<5, 4, kStreaming>(inputs, outputs, begin, end);
+  if (shape(6, 4)) return CopyFixed<6, 4, kStreaming>(inputs, outputs, begin, end);
+  if (shape(7, 4)) return CopyFixed<7, 4, kStreaming>(inputs, outputs, begin, end);
+  if (shape(8, 4)) return CopyFixed<8, 4, kStreaming>(inputs, outputs, begin, end);
+  if (shape(8, 2)) return CopyFixed<8, 2, kStreaming>(inputs, outputs, begin, end);
+  if (shape(8, 1)) return CopyFixed<8, 1, kStreaming>(inputs, outputs, begin, end);
+  if (shape(5, 1)) return CopyFixed<5, 1, kStreaming>(inputs, outputs, begin, end);
   const hn::ScalableTag<float> d;
   for (std::size_t lane = begin; lane < end; lane += hn::Lanes(d)) {
     auto sum = hn::Zero(d);
     for (int k = 0; k < input_count; ++k) {
       const auto value = hn::LoadU(d, inputs[k] + lane);
       if (k < output_count - 1)
-        hn::StoreU(value, d, outputs[k] + lane);
+        Put<kStreaming>(value, d, outputs[k] + lane);
       else
         sum = sum + value;
     }
-    hn::StoreU(sum, d, outputs[output_count - 1] + lane);
+    Put<kStreaming>(sum, d, outputs[output_count - 1] + lane);
   }
+}
+
+void CopyColumns(const float* const* inputs, int input_count, float* const* outputs, int output_count,
+                 std::size_t begin, std::size_t end, bool streaming) {
+  if (!streaming) return CopyColumnsBy<false>(inputs, input_count, outputs, output_count, begin, end);
+  CopyColumnsBy<true>(inputs, input_count, outputs, output_count, begin, end);
+  hwy::FlushStream();
 }
 
 float ReadColumn(const float* column, std::size_t begin, std::size_t end) {
@@ -136,8 +154,8 @@ std::uint64_t multiply_add(Target target, std::uint64_t rounds, float& sink) {
 }
 
 void copy_columns(Target target, const float* const* inputs, int input_count, float* const* outputs,
-                  int output_count, std::size_t begin, std::size_t end) {
-  table(target).copy_columns(inputs, input_count, outputs, output_count, begin, end);
+                  int output_count, std::size_t begin, std::size_t end, bool streaming) {
+  table(target).copy_columns(inputs, input_count, outputs, output_count, begin, end, streaming);
 }
 
 float read_column(Target target, const float* column, std::size_t begin, std::size_t end) {

@@ -54,10 +54,14 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
       report.limits.fma.push_back(measure_fma(*resolve(options.target), report.threads));
   }
 
-  std::size_t lanes = 0;
-  for (const Case& which : cases) lanes = std::max(lanes, which.batch);
-  auto columns = Columns::make(std::max(lanes, targets ? kTargetLanes : 0));
-  if (absl::IsResourceExhausted(columns.status()) && targets) columns = Columns::make(lanes);
+  std::size_t lanes = 0, malloc_lanes = 0;
+  for (const Case& which : cases) {
+    lanes = std::max(lanes, which.lanes());
+    if (which.inputs == Inputs::malloc_placed) malloc_lanes = std::max(malloc_lanes, which.batch);
+  }
+  const std::size_t target_lanes = targets ? kTargetLanes : 0;
+  auto columns = Columns::make(std::max(lanes, target_lanes), std::max(malloc_lanes, target_lanes));
+  if (absl::IsResourceExhausted(columns.status()) && targets) columns = Columns::make(lanes, malloc_lanes);
   if (!columns.ok()) return columns.status();
 
   now.part = "throughput";
@@ -122,9 +126,14 @@ double BenchResult::ns_per_accepted() const {
 }
 
 std::string BenchResult::name() const {
-  return fmt::format("{}/{}/{:g},{:g}/{}/{}{}", facetwise::name(operation),
-                     bench_name(distribution, masking, sampler), alpha_x, alpha_y, batch, implementation,
+  return fmt::format("{}/{}/{}/{}/{}{}", facetwise::name(operation), bench_name(distribution, masking, sampler),
+                     alpha_text(alpha_x, alpha_y, ","), batch, implementation,
                      inputs == "columns" ? "" : "/" + inputs);
+}
+
+std::string alpha_text(double alpha_x, double alpha_y, std::string_view between) {
+  if (alpha_x == 0 && alpha_y == 0) return "mixed";
+  return fmt::format("{:g}{}{:g}", alpha_x, between, alpha_y);
 }
 
 std::string model_name(std::string_view distribution, std::string_view masking) {

@@ -1,4 +1,4 @@
-// What a case does once: a call of the library, of a server, or of the scalar baseline's loop.
+// What a case does once: a call of the library, of a server, or of the baseline's loop.
 #pragma once
 
 #include <functional>
@@ -15,8 +15,7 @@ using Runner = std::function<absl::StatusOr<std::uint64_t>()>;
 // `columns` has the case's roughness set and outlives the runner. `remote` is for remote cases alone.
 Runner make_runner(const Case& which, const Columns& columns, Target target, Engine* remote);
 
-// The baseline in a plain loop over the batch's columns: returns how many lanes were occluded. The batch is
-// one of Columns::batch().
-std::uint64_t run_scalar(Operation operation, const Batch& batch);
+// Whether this build and CPU have the baseline's loops vectorised by the compiler for a target.
+bool has_auto_loops(Target target);
 
 }  // namespace facetwise::bench

@@ -15,7 +15,7 @@ using Out = std::back_insert_iterator<std::string>;
 // Results that differ in the implementation alone.
 struct Row {
   const BenchResult* any = nullptr;
-  const BenchResult *scalar = nullptr, *one_lane = nullptr, *simd = nullptr, *threads = nullptr,
+  const BenchResult *scalar = nullptr, *vectorised = nullptr, *one_lane = nullptr, *simd = nullptr, *threads = nullptr,
                     *remote = nullptr;
 
   bool takes(const BenchResult& r) const {
@@ -26,6 +26,7 @@ struct Row {
   void set(const BenchResult& r) {
     any = &r;
     if (r.implementation == "scalar") scalar = &r;
+    if (r.implementation == "auto") vectorised = &r;
     if (r.implementation == "one-lane") one_lane = &r;
     if (r.implementation == "simd") simd = &r;
     if (r.implementation == "simd-threads") threads = &r;
@@ -65,16 +66,17 @@ void add_results(const std::vector<BenchResult>& results, Out out) {
     const BenchResult& any = *row.any;
     if (k == 0 || rows[k - 1].any->operation != any.operation || rows[k - 1].any->inputs != any.inputs) {
       fmt::format_to(out, "\n{}{}\n", name(any.operation), any.inputs == "columns" ? "" : ", " + any.inputs);
-      fmt::format_to(out, "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8}{:>8}{:>8}{:>7}{:>7}\n",
-                     "sampler", "alpha", "batch", "scalar", "one-lane", "simd", "threads", "remote",
+      fmt::format_to(out, "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8}{:>8}{:>8}{:>7}{:>7}\n",
+                     "sampler", "alpha", "batch", "scalar", "auto", "one-lane", "simd", "threads", "remote",
                      "occluded", "ns/acc.", "M/s", "GB/s", "copy", "FMA");
     }
     // The last columns are of the fastest way on one thread.
     const BenchResult* best = row.simd ? row.simd : row.any;
     fmt::format_to(out,
-                   "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8.3g}{:>8.0f}{:>8}{:>7}{:>7}\n",
-                   bench_name(any.distribution, any.masking, any.sampler), fmt::format("{:g}, {:g}", any.alpha_x, any.alpha_y), batch_text(any.batch),
-                   time_text(row.scalar, nullptr), time_text(row.one_lane, row.scalar),
+                   "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8.3g}{:>8.0f}{:>8}{:>7}{:>7}\n",
+                   bench_name(any.distribution, any.masking, any.sampler), facetwise::alpha_text(any.alpha_x, any.alpha_y),
+                   batch_text(any.batch), time_text(row.scalar, nullptr), time_text(row.vectorised, row.scalar),
+                   time_text(row.one_lane, row.scalar),
                    time_text(row.simd, row.scalar), time_text(row.threads, row.scalar),
                    time_text(row.remote, row.scalar), fmt::format("{:.2f} %", 100 * best->share_occluded()),
                    best->ns_per_accepted(), best->samples_per_second() / 1e6,
@@ -118,7 +120,7 @@ void add_targets(const std::vector<TargetResult>& targets, Out out) {
   }
 }
 
-std::string alpha_text(const RejectionResult& r) { return fmt::format("{:g}, {:g}", r.alpha_x, r.alpha_y); }
+std::string alpha_text(const RejectionResult& r) { return facetwise::alpha_text(r.alpha_x, r.alpha_y); }
 
 // How many samplers each configuration was counted with: they stand next to each other.
 std::size_t samplers_of(const std::vector<const RejectionResult*>& results) {

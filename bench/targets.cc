@@ -4,7 +4,9 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "limits.h"
@@ -21,7 +23,8 @@ constexpr double kRound = 0.001;  // seconds that each side of a pair runs per r
 struct Roughness {
   float x, y;
 };
-constexpr Roughness kAlphas[] = {{0.3f, 0.3f}, {0.8f, 0.1f}};
+constexpr Roughness kMixed = {0, 0};  // as in Case
+constexpr Roughness kAlphas[] = {kMixed, {0.3f, 0.3f}, {0.8f, 0.1f}};
 
 // A case whose errors are kept for later, so that timing loops are plain.
 class Timed {
@@ -37,7 +40,7 @@ class Timed {
   absl::Status& status_;
 };
 
-std::string alpha_text(Roughness alpha) { return fmt::format("({:g}, {:g})", alpha.x, alpha.y); }
+std::string alpha_text(Roughness alpha) { return facetwise::alpha_text(alpha.x, alpha.y); }
 
 class Measuring {
  public:
@@ -58,16 +61,25 @@ class Measuring {
       exact_over_bounded_one_roughness(target);
       if (!next()) return status_;
     }
-    for (const Sampler sampler : {Sampler::bounded, Sampler::exact}) {
-      small_batch(sampler);
+    for (const auto& [lanes, share] : {std::pair<std::size_t, double>{1024, 0.9}, {128, 0.6}}) {
+      small_batch(lanes, share);
       if (!next()) return status_;
     }
-    for (const Sampler sampler : {Sampler::bounded, Sampler::exact}) {
-      large_batch(sampler);
-      if (!next()) return status_;
+    for (const Target target : available_targets()) {
+      if (vector_lanes(target) < 8) continue;
+      for (const Inputs inputs : {Inputs::columns, Inputs::fresh})
+        for (const Sampler sampler : {Sampler::cap, Sampler::exact})
+          for (const bool threads : {false, true}) {
+            beyond_cache(target, sampler, inputs, threads);
+            if (!next()) return status_;
+          }
+      for (const std::size_t lanes : {kBatch, kTargetLanes}) {
+        placement(target, lanes);
+        if (!next()) return status_;
+      }
     }
-    for (const Sampler sampler : {Sampler::bounded, Sampler::exact}) {
-      two_threads(sampler);
+    for (const auto& [lanes, gain] : {std::pair<std::size_t, double>{16384, 1.6}, {kBatch, 1.8}}) {
+      two_threads(lanes, gain);
       if (!next()) return status_;
     }
     remote();
@@ -85,12 +97,11 @@ class Measuring {
     return {which, columns_, target, options_.remote, status_};
   }
 
-  void roughness(Roughness alpha, std::size_t lanes) {
-    columns_.set_roughness(alpha.x, alpha.y, lanes);
-  }
+  void prepare(const Case& which) { status_.Update(columns_.prepare(which)); }
 
-  static Case sampling(Sampler sampler, Implementation implementation, std::size_t batch = kBatch) {
-    return {.sampler = sampler, .batch = batch, .implementation = implementation};
+  static Case sampling(Sampler sampler, Implementation implementation, std::size_t batch = kBatch,
+                       Roughness alpha = kMixed) {
+    return {.sampler = sampler, .alpha_x = alpha.x, .alpha_y = alpha.y, .batch = batch, .implementation = implementation};
   }
 
   void over_scalar(Target target) {
@@ -100,10 +111,11 @@ class Measuring {
                      .unit = "x",
                      .note = "smallest of"};
     for (const Roughness alpha : kAlphas) {
-      roughness(alpha, kBatch);
-      const Paired pair =
-          measure_paired(timed(sampling(Sampler::bounded, Implementation::scalar), target),
-                         timed(sampling(Sampler::bounded, Implementation::simd), target), kRounds, kRound);
+      const Case simd = sampling(Sampler::bounded, Implementation::simd, kBatch, alpha);
+      prepare(simd);
+      Case scalar = simd;
+      scalar.implementation = Implementation::scalar;
+      const Paired pair = measure_paired(timed(scalar, target), timed(simd, target), kRounds, kRound);
       row.measured = std::min(row.measured.value_or(pair.ratio), pair.ratio);
       row.note += fmt::format(" {:.1f} at {}: {:.2f} over {:.3f} ns;", pair.ratio, alpha_text(alpha),
                               1e9 * pair.a / kBatch, 1e9 * pair.b / kBatch);
@@ -119,25 +131,21 @@ class Measuring {
                      .measured = {},
                      .unit = "x",
                      .note = "largest of"};
-    const auto measure = [&](const std::string& where) {
-      const Paired pair =
-          measure_paired(timed(sampling(Sampler::exact, Implementation::simd), target),
-                         timed(sampling(Sampler::bounded, Implementation::simd), target), kRounds, kRound);
-      row.measured = std::max(row.measured.value_or(pair.ratio), pair.ratio);
-      row.note += fmt::format(" {:.2f} {};", pair.ratio, where);
-    };
     for (const Roughness alpha : kAlphas) {
-      roughness(alpha, kBatch);
-      measure("at " + alpha_text(alpha));
+      const Case exact = sampling(Sampler::exact, Implementation::simd, kBatch, alpha);
+      prepare(exact);
+      Case bounded = exact;
+      bounded.sampler = Sampler::bounded;
+      const Paired pair = measure_paired(timed(exact, target), timed(bounded, target), kRounds, kRound);
+      row.measured = std::max(row.measured.value_or(pair.ratio), pair.ratio);
+      row.note += fmt::format(" {:.2f} at {};", pair.ratio, alpha_text(alpha));
     }
-    columns_.set_mixed_roughness(kBatch);
-    measure("where it differs from lane to lane");
     row.note.pop_back();
     report_.targets.push_back(row);
   }
 
   void exact_over_bounded_one_roughness(Target target) {
-    Case exact = sampling(Sampler::exact, Implementation::simd);
+    Case exact = sampling(Sampler::exact, Implementation::simd, kBatch, {0.3f, 0.3f});
     exact.inputs = Inputs::one_roughness;
     Case bounded = exact;
     bounded.sampler = Sampler::bounded;
@@ -150,74 +158,122 @@ class Measuring {
                                .note = "alpha 0.3 for all lanes"});
   }
 
-  void small_batch(Sampler sampler) {
-    roughness(kAlphas[0], kBatch);
-    const Paired pair = measure_paired(timed(sampling(sampler, Implementation::simd), options_.target),
-                                       timed(sampling(sampler, Implementation::simd, 1000), options_.target),
-                                       kRounds, kRound);
-    const double measured = pair.ratio * 1000 / kBatch;
+  void small_batch(std::size_t lanes, double required) {
+    const Case large = sampling(Sampler::cap, Implementation::simd);
+    Case small = large;
+    small.batch = lanes;
+    prepare(large);
+    const Paired pair =
+        measure_paired(timed(large, options_.target), timed(small, options_.target), kRounds, kRound);
+    const double count = static_cast<double>(lanes);
     report_.targets.push_back(
-        {.what = fmt::format("{}: rate of 1,000 lanes over that of 64 k", name(sampler)),
-         .required = 0.85,
-         .measured = measured,
+        {.what = fmt::format("cap: rate of {} lanes over that of 64 k", lanes),
+         .required = required,
+         .measured = pair.ratio * count / kBatch,
          .unit = "x",
-         .note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.b / 1000, 1e9 * pair.a / kBatch)});
+         .note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.b / count, 1e9 * pair.a / kBatch)});
   }
 
-  void large_batch(Sampler sampler) {
-    TargetResult row{.what = fmt::format("{}: 16 M lanes' time over copying's or in-cache", name(sampler)),
-                     .required = 1.4,
+  // Times of several things in turn, in seconds a lane; the median over the rounds of what `ratio` makes of each.
+  struct Part {
+    std::function<void()> once;
+    double lanes;
+    int calls = 1;
+    std::vector<double> times{};
+  };
+  template <class Ratio>
+  static double in_turn(std::vector<Part>& parts, const Ratio& ratio) {
+    for (Part& part : parts) part.calls = calls_for(part.once, kRound);
+    std::vector<double> ratios;
+    for (int round = 0; round < 11; ++round) {
+      for (Part& part : parts) part.times.push_back(time_calls(part.once, part.calls) / part.lanes);
+      ratios.push_back(ratio([&](std::size_t k) { return parts[k].times.back(); }));
+    }
+    return median_of(ratios);
+  }
+
+  // Batches that no cache holds: of 16 M lanes, or of 1 M in a stream of fresh columns.
+  void beyond_cache(Target target, Sampler sampler, Inputs inputs, bool threads) {
+    const bool fresh = inputs == Inputs::fresh;
+    const double copies = threads ? 1.15 : 1.3, in_cache = 1.05;
+    TargetResult row{.what = fmt::format("{}, {}, {}, {}: time over limit", name(sampler), name(target),
+                                         fresh ? "fresh 1 M" : "16 M", threads ? "threads" : "1 thread"),
+                     .required = 1,
                      .at_least = false,
                      .measured = {},
                      .unit = "x",
                      .note = {}};
     if (columns_.lanes() < kTargetLanes) {
       row.note = "not measured: there is no memory for 16 M lanes";
-      report_.targets.push_back(row);
-      return;
+    } else if (threads && report_.threads < 2) {
+      row.note = "not measured: one thread only";
+    } else {
+      Case large = sampling(sampler, threads ? Implementation::simd_threads : Implementation::simd,
+                            fresh ? std::size_t{1} << 20 : kTargetLanes);
+      large.inputs = inputs;
+      Case small = large;
+      small.inputs = Inputs::columns;
+      small.batch = kBatch;
+      prepare(large);
+      std::vector<Part> parts = {{timed(large, target), static_cast<double>(large.batch)},
+                                 {timed(small, target), static_cast<double>(kBatch)}};
+      for (int order = 0; order < kCopyOrders; ++order)
+        parts.push_back({make_copy(columns_, large.input_columns(), large.output_columns(), kTargetLanes, target, threads,
+                                   static_cast<CopyOrder>(order)),
+                         static_cast<double>(kTargetLanes)});
+      const auto copy = [](const auto& time) { return std::min({time(2), time(3), time(4)}); };
+      row.measured = in_turn(parts, [&](const auto& time) {
+        return time(0) / std::max(copies * copy(time), in_cache * time(1));
+      });
+      const auto median = [&](std::size_t k) { return 1e9 * median_of(parts[k].times); };
+      row.note = fmt::format("{:.3f} ns a sample; limit: {:g} x copying {:.3f} or {:g} x 64 k lanes {:.3f}, the longer",
+                             median(0), copies, copy(median), in_cache, median(1));
     }
-    roughness(kAlphas[0], kTargetLanes);
-    const Case large = sampling(sampler, Implementation::simd, kTargetLanes);
-    const Timed sample = timed(large, options_.target),
-                in_cache = timed(sampling(sampler, Implementation::simd), options_.target);
-    const auto copy = [&](CopyOrder order) {
-      return make_copy(columns_, large.input_columns(), large.output_columns(), kTargetLanes, options_.target,
-                       false, order);
-    };
-    const auto one_by_one = copy(CopyOrder::one_by_one), side_by_side = copy(CopyOrder::side_by_side);
-    const int in_cache_calls = calls_for(in_cache, kRound);
-    sample();
-    std::vector<double> ratios, samples, copies, caches;
-    for (int round = 0; round < 7; ++round) {
-      constexpr double kLanes = kTargetLanes;
-      samples.push_back(time_calls(sample, 1) / kLanes);
-      copies.push_back(std::min(time_calls(one_by_one, 1), time_calls(side_by_side, 1)) / kLanes);
-      caches.push_back(time_calls(in_cache, in_cache_calls) / kBatch);
-      ratios.push_back(samples.back() / std::max(copies.back(), caches.back()));
-    }
-    row.measured = median_of(ratios);
-    row.note = fmt::format("{:.3f} ns a sample; copying {:.3f}, 64 k lanes {:.3f}", 1e9 * median_of(samples),
-                           1e9 * median_of(copies), 1e9 * median_of(caches));
     report_.targets.push_back(row);
   }
 
-  void two_threads(Sampler sampler) {
-    TargetResult row{.what = fmt::format("{}: two threads over one, in cache", name(sampler)),
-                     .required = 1.8,
+  void placement(Target target, std::size_t lanes) {
+    TargetResult row{.what = fmt::format("cap, {}, {}: malloc's columns over kind ones", name(target),
+                                         lanes == kBatch ? "64 k" : "16 M"),
+                     .required = 1.15,
+                     .at_least = false,
+                     .measured = {},
+                     .unit = "x",
+                     .note = {}};
+    if (columns_.malloc_lanes() < lanes) {
+      row.note = "not measured: there is no memory for 16 M lanes twice";
+    } else {
+      const Case kind = sampling(Sampler::cap, Implementation::simd, lanes);
+      Case placed = kind;
+      placed.inputs = Inputs::malloc_placed;
+      prepare(placed);
+      const double count = static_cast<double>(lanes);
+      std::vector<Part> parts = {{timed(placed, target), count}, {timed(kind, target), count}};
+      row.measured = in_turn(parts, [](const auto& time) { return time(0) / time(1); });
+      row.note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * median_of(parts[0].times),
+                             1e9 * median_of(parts[1].times));
+    }
+    report_.targets.push_back(row);
+  }
+
+  void two_threads(std::size_t lanes, double required) {
+    TargetResult row{.what = fmt::format("cap: two threads over one, {} k lanes", lanes / 1024),
+                     .required = required,
                      .measured = {},
                      .unit = "x",
                      .note = {}};
     if (report_.threads < 2) {
       row.note = "not measured: one thread only";
     } else {
-      roughness(kAlphas[0], kBatch);
+      const Case one = sampling(Sampler::cap, Implementation::simd, lanes);
+      prepare(one);
       tbb::task_arena two(2);
-      const Timed both = timed(sampling(sampler, Implementation::simd_threads), options_.target);
+      const Timed both = timed(sampling(Sampler::cap, Implementation::simd_threads, lanes), options_.target);
       const Paired pair = measure_paired(
-          timed(sampling(sampler, Implementation::simd), options_.target),
-          [&] { two.execute([&] { both(); }); }, kRounds, kRound);
+          timed(one, options_.target), [&] { two.execute([&] { both(); }); }, kRounds, kRound);
       row.measured = pair.ratio;
-      row.note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.a / kBatch, 1e9 * pair.b / kBatch);
+      const double count = static_cast<double>(lanes);
+      row.note = fmt::format("{:.3f} and {:.3f} ns a sample", 1e9 * pair.a / count, 1e9 * pair.b / count);
     }
     report_.targets.push_back(row);
   }
@@ -231,7 +287,7 @@ class Measuring {
     if (options_.remote == nullptr) {
       row.note = "not measured: no server was given";
     } else {
-      roughness(kAlphas[0], std::size_t{1} << 20);
+      prepare(sampling(Sampler::bounded, Implementation::simd, std::size_t{1} << 20));
       const Timed local = timed(sampling(Sampler::bounded, Implementation::simd), options_.target);
       const Timed far = timed(sampling(Sampler::bounded, Implementation::remote), options_.target);
       const Timed far_large =

@@ -10,7 +10,7 @@
 
 namespace facetwise::bench {
 
-// Lanes that `columns` must have: 16 M for the batch that does not fit into a cache.
+// Lanes that `columns` should have, of either placement: 16 M for batches that do not fit into a cache.
 inline constexpr std::size_t kTargetLanes = std::size_t{1} << 24;
 
 // Measures each and appends to report.targets. Stops with Cancelled when `step()` returns false.

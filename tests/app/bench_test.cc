@@ -43,6 +43,7 @@ TEST(Bench, MeasuresHereAndRemotely) {
   std::vector<std::string> implementations;
   for (const Json& row : report["results"]) implementations.push_back(row["implementation"]);
   std::sort(implementations.begin(), implementations.end());
+  std::erase(implementations, "auto");  // where the compiler has vector functions for the target
   EXPECT_EQ(implementations,
             (std::vector<std::string>{"one-lane", "remote", "scalar", "simd", "simd-threads"}));
 }

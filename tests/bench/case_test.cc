@@ -35,7 +35,7 @@ TEST_F(Cases, FullHasEveryCombination) {
         "sample_reflection/heitz", "sample_reflection/cap", "sample_reflection/bounded",
         "sample_reflection/exact", "pdf_reflection/ndf", "pdf_reflection/exact", "evaluate_reflection/none",
         "evaluate_and_pdf/cap", "evaluate_and_pdf/exact", "masking/none"})
-    for (const char* alpha : {"0.01,0.01", "0.3,0.3", "1,1", "0.8,0.1"})
+    for (const char* alpha : {"mixed", "0.01,0.01", "0.3,0.3", "1,1", "0.8,0.1"})
       for (const char* batch : {"256", "4096", "65536", "1048576", "16777216"})
         for (const char* implementation : {"scalar", "one-lane", "simd", "simd-threads", "remote"}) {
           const std::string name = std::string(operation) + "/" + alpha + "/" + batch + "/" + implementation;

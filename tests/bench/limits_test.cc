@@ -42,7 +42,7 @@ TEST(Copy, ReadsAndWritesTheColumns) {
   auto columns = Columns::make(4096);
   ASSERT_TRUE(columns.ok());
   columns->set_roughness(0.3f, 0.2f, 4096);
-  for (const CopyOrder order : {CopyOrder::one_by_one, CopyOrder::side_by_side})
+  for (const CopyOrder order : {CopyOrder::one_by_one, CopyOrder::side_by_side, CopyOrder::streaming})
     for (const bool threads : {false, true})
       for (const auto& [inputs, outputs] : std::vector<std::pair<int, int>>{{7, 4}, {8, 4}, {8, 1}, {6, 3}})
         for (const std::size_t batch : {16u, 4096u}) {
@@ -50,7 +50,7 @@ TEST(Copy, ReadsAndWritesTheColumns) {
           make_copy(*columns, inputs, outputs, batch, Target::best, threads, order)();
           for (int k = 0; k < outputs; ++k) {
             // Side by side, the last output takes in the inputs that are left.
-            const bool sum = order == CopyOrder::side_by_side && k == outputs - 1;
+            const bool sum = order != CopyOrder::one_by_one && k == outputs - 1;
             for (std::size_t lane = 0; lane < batch; ++lane) {
               float expected = columns->input(k)[lane];
               if (sum)

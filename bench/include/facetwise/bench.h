@@ -23,7 +23,7 @@ enum class BenchSuite {
 
 struct BenchOptions {
   // Regular expression (RE2) that is searched for in names such as
-  // "sample_reflection/bounded/0.3,0.3/65536/simd": see BenchResult::name(). With a filter, and `suite` left
+  // "sample_reflection/bounded/mixed/65536/simd": see BenchResult::name(). With a filter, and `suite` left
   // at standard, the choice is from all benchmarks; rejections and targets are left out.
   std::string filter;
   BenchSuite suite = BenchSuite::standard;
@@ -49,10 +49,12 @@ struct BenchResult {
   Operation operation{};
   std::string distribution = "ggx", masking = "smith";
   std::string sampler;  // "none" where the operation has no use for one
-  double alpha_x = 0, alpha_y = 0;
-  std::string implementation;  // "scalar" | "one-lane" | "simd" | "simd-threads" | "remote"
-  // How inputs are given: "columns" (everything per lane, all i_z > 0), or the same but "one-roughness" (one
-  // value for all lanes), "generator" (in-kernel random numbers) or "backfacing" (i_z < 0 in 10 % of lanes).
+  double alpha_x = 0, alpha_y = 0;  // both 0: "mixed", different in every lane, evenly spread over [0.05, 1]^2
+  std::string implementation;       // "scalar" | "auto" | "one-lane" | "simd" | "simd-threads" | "remote"
+  // How inputs are given: "columns" (everything per lane, all i_z > 0, columns placed kindly and used again and again), or
+  // the same but "malloc" (columns placed as malloc does), "fresh" (every batch in columns that no cache holds),
+  // "one-roughness" (one value for all lanes), "generator" (in-kernel random numbers) or "backfacing" (i_z < 0 in
+  // 10 % of lanes).
   std::string inputs;
   std::uint64_t batch = 0;
   int threads = 1;               // that compute on this machine; 0 for remote
@@ -69,11 +71,13 @@ struct BenchResult {
   double samples_per_second() const { return 1e9 / ns_per_sample; }
   double bytes_per_second() const { return bytes_per_sample * samples_per_second(); }
   double share_occluded() const { return static_cast<double>(rejected) / static_cast<double>(samples); }
-  // "operation/sampler/alpha_x,alpha_y/batch/implementation", and "/inputs" unless they are "columns". The sampler
+  // "operation/sampler/alpha_x,alpha_y/batch/implementation" ("mixed" for the roughness that is), and "/inputs" unless they are "columns". The sampler
   // of other models than GGX with Smith is as bench_name() says.
   std::string name() const;
 };
 
+// "0.3, 0.1" with ", " between them; "mixed" where both are 0.
+std::string alpha_text(double alpha_x, double alpha_y, std::string_view between = ", ");
 // "" for ggx with smith, else "beckmann-smith".
 std::string model_name(std::string_view distribution, std::string_view masking);
 // "exact", "beckmann-smith/exact": a sampler in the names of results.

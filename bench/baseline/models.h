@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "facetwise/baseline.h"
+#include "bench/baseline/baseline.h"
 
 namespace facetwise::baseline {
+inline namespace FACETWISE_BASELINE_BUILD {
 namespace internal {
 
 inline constexpr float kInverseRootPi = 0.564189583547756f;
@@ -77,7 +78,7 @@ inline float cavity_masking(Vector i, float im, float mz) { return std::min(2 * 
 
 // A normal with density D(m) m_z, of any length.
 inline Vector draw_ndf(Distribution which, float ax, float ay, float u1, float u2) {
-  const float phi = 2 * kPi * u2;
+  const Azimuth phi(u2);
   float r = 0;  // of the stretched slope
   if (which == Distribution::ggx)
     r = std::sqrt(u1 / (1 - u1));
@@ -85,7 +86,7 @@ inline Vector draw_ndf(Distribution which, float ax, float ay, float u1, float u
     r = std::sqrt(-std::log(1 - u1));
   else
     r = std::sqrt(2 * (1 / std::sqrt(1 - u1) - 1));
-  return {ax * r * std::cos(phi), ay * r * std::sin(phi), 1};
+  return {ax * r * phi.cos, ay * r * phi.sin, 1};
 }
 
 // A visible normal of Beckmann's, of any length. The slope in i's plane by inverting its distribution with Newton's
@@ -211,4 +212,5 @@ inline float masking(Model model, Vector i, float alpha_x, float alpha_y) {
   return i.z > 0 ? i.z / internal::area(model.distribution, i, alpha_x, alpha_y) : 0;
 }
 
+}  // namespace FACETWISE_BASELINE_BUILD
 }  // namespace facetwise::baseline

@@ -1,6 +1,6 @@
 // The scalar baseline computes what the reference does, to float's accuracy: it is an honest thing to compare
 // with.
-#include "facetwise/baseline.h"
+#include "bench/baseline/baseline.h"
 
 #include <gtest/gtest.h>
 

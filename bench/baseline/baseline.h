@@ -3,12 +3,18 @@
 // smooth or invalid lanes.
 //
 // Everything is inline, so that a loop with a fixed sampler that does not use the weight does not pay for
-// it, as in a renderer.
+// it, as in a renderer. Files that are compiled for other instruction sets define FACETWISE_BASELINE_BUILD, so that
+// their functions have names of their own.
 #pragma once
 
 #include "facetwise/model.h"
 
+#ifndef FACETWISE_BASELINE_BUILD
+#define FACETWISE_BASELINE_BUILD plain
+#endif
+
 namespace facetwise::baseline {
+inline namespace FACETWISE_BASELINE_BUILD {
 
 struct Vector {
   float x = 0, y = 0, z = 0;
@@ -44,7 +50,8 @@ inline float pdf_reflection(Model model, Sampler sampler, Vector i, Vector o, fl
 inline float evaluate_reflection(Model model, Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
 inline float masking(Model model, Vector i, float alpha_x, float alpha_y);  // Smith
 
+}  // namespace FACETWISE_BASELINE_BUILD
 }  // namespace facetwise::baseline
 
-#include "facetwise/baseline_inl.h"         // IWYU pragma: export
-#include "facetwise/baseline_models_inl.h"  // IWYU pragma: export
+#include "bench/baseline/ggx.h"     // IWYU pragma: export
+#include "bench/baseline/models.h"  // IWYU pragma: export

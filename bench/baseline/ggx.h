@@ -1,15 +1,30 @@
-// Definitions of baseline.h. Formulas and their sources: docs/math.md.
+// Definitions of baseline.h: GGX with Smith masking. Formulas and their sources: docs/math.md.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
-#include "facetwise/baseline.h"
+#include "bench/baseline/baseline.h"
 
 namespace facetwise::baseline {
+inline namespace FACETWISE_BASELINE_BUILD {
 namespace internal {
 
 inline constexpr float kPi = 3.14159265358979f;
+
+#ifdef FACETWISE_BASELINE_VECTORISED
+inline constexpr bool kVectorised = true;
+// gcc joins std::sin and std::cos of one angle to a call that has no vector function. These have one, and are kept apart
+// by -fno-builtin.
+extern "C" float sinf(float) noexcept __attribute__((const, simd("notinbranch")));
+extern "C" float cosf(float) noexcept __attribute__((const, simd("notinbranch")));
+inline float sine(float x) { return sinf(x); }
+inline float cosine(float x) { return cosf(x); }
+#else
+inline constexpr bool kVectorised = false;
+inline float sine(float x) { return std::sin(x); }
+inline float cosine(float x) { return std::cos(x); }
+#endif
 
 inline Vector operator+(Vector a, Vector b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vector operator-(Vector a, Vector b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -61,8 +76,9 @@ inline Cone cone(Vector i, const Stretched& s, float ax, float ay) {
   const float mean = ax == ay ? px : s.a > 0 ? (s.w.x * s.w.x * px + s.w.y * s.w.y * py) / s.a : 0;
   const float root = std::sqrt((i.z + mean) * (i.z + mean) + 4 * s.a);
   float lambda = i.z >= mean ? (i.z - mean + root) / 2 : 2 * (i.z * mean + s.a) / (root + mean - i.z);
-  if (ax != ay) {
-    const int steps = std::max(ax, ay) > 1 ? 4 : 2;
+  // Vector code takes the same steps for all.
+  if (kVectorised || ax != ay) {
+    const int steps = kVectorised || std::max(ax, ay) > 1 ? 4 : 2;
     for (int step = 0; step < steps; ++step) {
       const float inverse_p = 1 / (lambda + px), inverse_q = 1 / (lambda + py);
       const float x = s.w.x * s.w.x * inverse_p, y = s.w.y * s.w.y * inverse_q;
@@ -100,21 +116,27 @@ inline float shadowing_weight(Shadowing shadowing, Vector i, const Stretched& s,
   return s.area / (s.area + std::abs(i.z) * lambda);
 }
 
-inline Vector draw_ndf(float u1, float u2) {
-  const float phi = 2 * kPi * u2, r = std::sqrt(u1);
-  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u1)};
+// The angle 2 pi u2, which every sampler takes.
+struct Azimuth {
+  explicit Azimuth(float u2) : cos(cosine(2 * kPi * u2)), sin(sine(2 * kPi * u2)) {}
+  float cos, sin;
+};
+
+inline Vector draw_ndf(float u1, Azimuth phi) {
+  const float r = std::sqrt(u1);
+  return {r * phi.cos, r * phi.sin, std::sqrt(1 - u1)};
 }
 
-inline Vector draw_heitz(const Stretched& s, float u1, float u2) {
+inline Vector draw_heitz(const Stretched& s, float u1, Azimuth phi) {
   const Vector v = (1 / s.nu) * s.w;
   const float length2 = v.x * v.x + v.y * v.y;
   const float inverse_length = length2 > 0 ? 1 / std::sqrt(length2) : 0;
   const Vector t1 = length2 > 0 ? Vector{-v.y * inverse_length, v.x * inverse_length, 0} : Vector{0, 1, 0};
   const Vector t2 = {-v.z * t1.y, v.z * t1.x, v.x * t1.y - v.y * t1.x};  // v x t1
-  const float phi = 2 * kPi * u2, r = std::sqrt(u1);
-  const float p1 = r * std::cos(phi);
+  const float r = std::sqrt(u1);
+  const float p1 = r * phi.cos;
   const float blend = s.area / s.nu;  // (1 + v_z) / 2
-  const float p2 = (1 - blend) * std::sqrt(std::max(0.0f, 1 - p1 * p1)) + blend * r * std::sin(phi);
+  const float p2 = (1 - blend) * std::sqrt(std::max(0.0f, 1 - p1 * p1)) + blend * r * phi.sin;
   const float p3 = std::sqrt(std::max(0.0f, 1 - p1 * p1 - p2 * p2));
   Vector m = p1 * t1 + p2 * t2 + p3 * v;
   m.z = std::max(m.z, 1e-7f);
@@ -122,17 +144,16 @@ inline Vector draw_heitz(const Stretched& s, float u1, float u2) {
 }
 
 // The half vector of i_hat and a point of the cap o_hat_z in (-k c, 1].
-inline Vector draw_cap(const Stretched& s, float k, float u1, float u2) {
+inline Vector draw_cap(const Stretched& s, float k, float u1, Azimuth phi) {
   const Vector v = (1 / s.nu) * s.w;
-  const float phi = 2 * kPi * u2;
   const float z = 1 - u1 * (1 + k * v.z);
   const float r = std::sqrt(std::max(0.0f, (1 - z) * (1 + z)));
-  return {v.x + r * std::cos(phi), v.y + r * std::sin(phi), std::max(v.z + z, 1e-7f)};
+  return {v.x + r * phi.cos, v.y + r * phi.sin, std::max(v.z + z, 1e-7f)};
 }
 
-inline Vector draw_exact(Vector i, const Stretched& s, const Cone& c, float ax, float ay, float u1, float u2,
+inline Vector draw_exact(Vector i, const Stretched& s, const Cone& c, float ax, float ay, float u1, Azimuth phi,
                          float u3) {
-  const float phi = 2 * kPi * u2, cos = std::cos(phi), sin = std::sin(phi);
+  const float cos = phi.cos, sin = phi.sin;
   const float r = std::sqrt(c.lambda * u1);
   const float root_p = std::sqrt(c.p), root_q = ax == ay ? root_p : std::sqrt(c.q);
   const float x = r * cos / root_p, y = r * sin / root_q;
@@ -156,22 +177,24 @@ struct Drawn {
 
 inline Drawn draw(Sampler sampler, Vector i, const Stretched& s, float ax, float ay, float u1, float u2,
                   float u3) {
+  const Azimuth phi(u2);
   Vector h;
   float n = s.area;
   if (sampler == Sampler::ndf) {
-    h = draw_ndf(u1, u2);
+    h = draw_ndf(u1, phi);
   } else if (sampler == Sampler::heitz) {
-    h = draw_heitz(s, u1, u2);
+    h = draw_heitz(s, u1, phi);
   } else if (sampler == Sampler::exact && i.z > 0) {
     const Cone c = cone(i, s, ax, ay);
-    h = draw_exact(i, s, c, ax, ay, u1, u2, u3);
+    h = draw_exact(i, s, c, ax, ay, u1, phi, u3);
     n = c.k;
-  } else if (sampler == Sampler::bounded && i.z > 0) {
-    const float k = bound(i, ax, ay);
-    h = draw_cap(s, k, u1, u2);
-    n = (k * i.z + s.nu) / 2;
   } else {
-    h = draw_cap(s, 1, u1, u2);
+    float k = 1;
+    if (sampler == Sampler::bounded && i.z > 0) {
+      k = bound(i, ax, ay);
+      n = (k * i.z + s.nu) / 2;
+    }
+    h = draw_cap(s, k, u1, phi);
   }
   return {normalize({ax * h.x, ay * h.y, h.z}), n};
 }
@@ -231,4 +254,5 @@ inline float masking(Vector i, float alpha_x, float alpha_y) {
   return i.z > 0 ? i.z / internal::stretch(i, alpha_x, alpha_y).area : 0;
 }
 
+}  // namespace FACETWISE_BASELINE_BUILD
 }  // namespace facetwise::baseline

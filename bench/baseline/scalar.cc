@@ -1,0 +1,23 @@
+// The baseline as it is: scalar code.
+#include "bench/baseline/loops.h"
+
+namespace facetwise::baseline {
+namespace {
+
+template <Masking masking>
+std::uint64_t run_masking(const Loop& loop) {
+  switch (loop.distribution) {
+    case Distribution::ggx: return run_model<Model{Distribution::ggx, masking}>(loop);
+    case Distribution::beckmann: return run_model<Model{Distribution::beckmann, masking}>(loop);
+    case Distribution::student_t: return run_model<Model{Distribution::student_t, masking}>(loop);
+    default: return 0;
+  }
+}
+
+}  // namespace
+
+std::uint64_t run_scalar(const Loop& loop) {
+  return loop.masking == Masking::smith ? run_masking<Masking::smith>(loop) : run_masking<Masking::vcavity>(loop);
+}
+
+}  // namespace facetwise::baseline
