@@ -33,29 +33,22 @@ std::uint64_t available_memory() {
 
 }  // namespace
 
-void Columns::Memory::allocate() {
-  data.reset(new (std::align_val_t{4096}) float[offset + (kInputs + kOutputs) * stride]());
-}
-
 absl::StatusOr<Columns> Columns::make(std::size_t lanes, std::size_t malloc_lanes) {
-  Columns columns;
-  // Five cache lines between columns, so that the same lane of two columns is never at the same place of a
-  // page.
-  columns.kind_.lanes = lanes;
-  columns.kind_.stride = (lanes + 15) / 16 * 16 + 80;
+  constexpr std::size_t kColumns = std::size_t{kInputs} + kOutputs;
   // Large pieces of memory from malloc are whole pages of which it takes the first 16 bytes itself.
   constexpr std::size_t kPage = 4096 / sizeof(float);
-  columns.malloc_.lanes = malloc_lanes;
-  columns.malloc_.offset = 4;
-  columns.malloc_.stride = malloc_lanes == 0 ? 0 : (malloc_lanes + 4 + kPage - 1) / kPage * kPage;
-  const std::uint64_t bytes =
-      (kInputs + kOutputs) * (columns.kind_.stride + columns.malloc_.stride) * sizeof(float);
+  const std::size_t malloc_stride = malloc_lanes == 0 ? 0 : (malloc_lanes + kMallocOffset + kPage - 1) / kPage * kPage;
+  const std::uint64_t bytes = ColumnMemory::bytes(kColumns, lanes) + kColumns * malloc_stride * sizeof(float);
   if (bytes > available_memory() / 10 * 9)
     return absl::ResourceExhaustedError(absl::StrCat("batch: columns of ", lanes, " lanes take ", bytes >> 20,
                                                      " MiB, more than this machine has free; filter for "
                                                      "smaller batches"));
-  columns.kind_.allocate();
-  columns.malloc_.allocate();
+  Columns columns;
+  columns.kind_ = ColumnMemory(kColumns, lanes);
+  columns.malloc_lanes_ = malloc_lanes;
+  columns.malloc_stride_ = malloc_stride;
+  columns.malloc_.reset(new (std::align_val_t{4096}) float[kColumns * malloc_stride + kMallocOffset]());
+  for (std::size_t k = 0; k < kColumns; ++k) std::fill_n(columns.kind_[k], lanes, 0.0f);
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     const float z = std::max(uniform(lane, 0), 0x1p-24f);
     const float r = std::sqrt((1 - z) * (1 + z));
@@ -85,7 +78,7 @@ void Columns::set_roughness(float alpha_x, float alpha_y, std::size_t lanes) {
 absl::Status Columns::prepare(const Case& which) {
   set_roughness(which.alpha_x, which.alpha_y, which.lanes());
   if (which.inputs == Inputs::malloc_placed)
-    for (int k = 0; k < kInputs; ++k) std::copy_n(kind_.column(k), which.batch, malloc_.column(k));
+    for (int k = 0; k < kInputs; ++k) std::copy_n(input(k), which.batch, malloc_column(k));
   if (which.is_sampling() || which.operation == Operation::masking) return absl::OkStatus();
   const std::size_t lanes = which.batch;
   const Case drawing{.operation = which.operation == Operation::evaluate_transmission ? Operation::sample_transmission
@@ -111,9 +104,10 @@ absl::Status Columns::prepare(const Case& which) {
 
 Batch Columns::batch(const Case& which, std::size_t first) const {
   const std::size_t lanes = which.batch;
-  const Memory& memory = which.inputs == Inputs::malloc_placed ? malloc_ : kind_;
-  const auto in = [&](Index index) { return Column<float>(memory.column(index) + first, lanes); };
-  const auto out = [&](int index) { return OutputColumn<float>(memory.column(kInputs + index) + first, lanes); };
+  const bool placed = which.inputs == Inputs::malloc_placed;
+  const auto column = [&](int index) { return (placed ? malloc_column(index) : input(index)) + first; };
+  const auto in = [&](Index index) { return Column<float>(column(index), lanes); };
+  const auto out = [&](int index) { return OutputColumn<float>(column(kInputs + index), lanes); };
   Batch batch;
   batch.lanes = lanes;
   batch.model = which.model();

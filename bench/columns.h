@@ -1,5 +1,5 @@
-// The memory that benchmarks read and write: columns as a caller that cares lays them out, each aligned to a
-// cache line and all at different offsets in their pages, and others as malloc does.
+// The memory that benchmarks read and write: columns as a caller that cares places them (ColumnMemory), and others as
+// malloc does.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "case.h"
 #include "facetwise/batch.h"
+#include "facetwise/column_memory.h"
 
 namespace facetwise::bench {
 
@@ -19,8 +20,8 @@ class Columns {
   // the memory that is free.
   static absl::StatusOr<Columns> make(std::size_t lanes, std::size_t malloc_lanes = 0);
 
-  std::size_t lanes() const { return kind_.lanes; }
-  std::size_t malloc_lanes() const { return malloc_.lanes; }
+  std::size_t lanes() const { return kind_.lanes(); }
+  std::size_t malloc_lanes() const { return malloc_lanes_; }
   // Roughness of the first `lanes` lanes; mixed if it is 0 (Case).
   void set_roughness(float alpha_x, float alpha_y, std::size_t lanes);
   // The case's roughness and, for a query, outgoing directions drawn for it: by its model's visible normals,
@@ -34,23 +35,22 @@ class Columns {
   // i_z < 0.
   enum Index { kIx, kIy, kIz, kIzBackfacing, kAlphaX, kAlphaY, kU1, kU2, kU3, kOx, kOy, kOz, kInputs };
   static constexpr int kOutputs = 4;
-  float* input(int index) const { return kind_.column(index); }
-  float* output(int index) const { return kind_.column(kInputs + index); }
+  float* input(int index) const { return kind_[static_cast<std::size_t>(index)]; }
+  float* output(int index) const { return input(kInputs + index); }
 
  private:
   Columns() = default;
 
-  struct Free {
+    struct Free {
     void operator()(float* p) const { ::operator delete[](p, std::align_val_t{4096}); }
   };
-  // All columns in one piece of memory, `stride` floats apart.
-  struct Memory {
-    std::size_t lanes = 0, stride = 0, offset = 0;
-    std::unique_ptr<float[], Free> data;
-    void allocate();
-    float* column(int index) const { return data.get() + offset + static_cast<std::size_t>(index) * stride; }
-  };
-  Memory kind_, malloc_;
+  static constexpr std::size_t kMallocOffset = 4;
+  float* malloc_column(int index) const {
+    return malloc_.get() + kMallocOffset + static_cast<std::size_t>(index) * malloc_stride_;
+  }
+  ColumnMemory kind_;
+  std::size_t malloc_lanes_ = 0, malloc_stride_ = 0;
+  std::unique_ptr<float[], Free> malloc_;
   // What set_roughness() has set: of how many lanes, and how many have queries' directions, drawn how.
   float alpha_x_ = -1, alpha_y_ = -1;
   std::size_t rough_lanes_ = 0, query_lanes_ = 0;
