@@ -4,49 +4,50 @@
 
 #include <algorithm>
 #include <chrono>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "app/errors.h"
 
 namespace facetwise::app {
 namespace {
 
-struct FileColumn {
-  std::string_view name;   // in files
-  std::string_view field;  // in the batch: input_fields() and output_fields()
-};
+// A field's name in files: "incident.x" is ix, "out.outgoing.x" ox, "out.normal.x" mx; the others are called as they are.
+std::string file_name(std::string_view field) {
+  if (field.starts_with("out.")) field.remove_prefix(4);
+  constexpr std::pair<std::string_view, char> kDirections[] = {{"incident.", 'i'}, {"outgoing.", 'o'}, {"normal.", 'm'}};
+  for (const auto& [prefix, letter] : kDirections)
+    if (field.starts_with(prefix)) return {letter, field.back()};
+  return std::string(field);
+}
 
-constexpr FileColumn kInputColumns[] = {
-    {"ix", "incident.x"},   {"iy", "incident.y"}, {"iz", "incident.z"}, {"alpha_x", "alpha_x"},
-    {"alpha_y", "alpha_y"}, {"ox", "outgoing.x"}, {"oy", "outgoing.y"}, {"oz", "outgoing.z"},
-    {"u1", "u1"},           {"u2", "u2"},         {"u3", "u3"},
-    {"mean_slope_x", "mean_slope_x"},
-    {"mean_slope_y", "mean_slope_y"},
-    {"slope_correlation", "slope_correlation"},
-    {"eta", "eta"},         {"f0", "f0"},         {"f90", "f90"}};
-constexpr FileColumn kOutputColumns[] = {
-    {"ox", "out.outgoing.x"}, {"oy", "out.outgoing.y"}, {"oz", "out.outgoing.z"},
-    {"mx", "out.normal.x"},   {"my", "out.normal.y"},   {"mz", "out.normal.z"},
-    {"pdf", "out.pdf"},       {"weight", "out.weight"}, {"value", "out.value"},
-    {"branch_probability", "out.branch_probability"},
-    {"eta_scale", "out.eta_scale"}};
-constexpr FileColumn kByteColumns[] = {{"event", "out.event"}, {"status", "out.status"}};
-
-template <class Fields>
-const auto& field_named(const Fields& fields, std::string_view name) {
-  return *std::find_if(fields.begin(), fields.end(), [&](const auto& field) { return field.name == name; });
+// What a call writes to files: all that it computes but i.m, which m says.
+std::vector<const OutputField*> written_fields(const FileCall& call) {
+  std::vector<const OutputField*> fields;
+  for (const OutputField& field : output_fields())
+    if (computes(call.operation, call.model, field) && field.name != "out.incident_dot_normal") fields.push_back(&field);
+  return fields;
+}
+std::vector<const ByteField*> written_bytes(const FileCall& call) {
+  std::vector<const ByteField*> fields;
+  for (const ByteField& field : byte_fields())
+    if (computes(call.operation, field)) fields.push_back(&field);
+  // The status is the last column of a file.
+  std::reverse(fields.begin(), fields.end());
+  return fields;
 }
 
 bool known_column(std::string_view name) {
-  const auto is_it = [&](const FileColumn& column) { return column.name == name; };
-  return std::any_of(std::begin(kInputColumns), std::end(kInputColumns), is_it) ||
-         std::any_of(std::begin(kOutputColumns), std::end(kOutputColumns), is_it) ||
-         std::any_of(std::begin(kByteColumns), std::end(kByteColumns), is_it);
+  const auto any_of = [&](const auto& fields) {
+    return std::any_of(fields.begin(), fields.end(), [&](const auto& field) { return file_name(field.name) == name; });
+  };
+  return any_of(input_fields()) || any_of(output_fields()) || any_of(byte_fields());
 }
 
 std::string known_inputs() {
   std::string names;
-  for (const FileColumn& column : kInputColumns) names += fmt::format(" {}", column.name);
+  for (const InputField& field : input_fields()) names += fmt::format(" {}", file_name(field.name));
   return names;
 }
 
@@ -70,14 +71,6 @@ std::optional<Constant> constant(const FileCall& call, std::string_view column) 
   return std::nullopt;
 }
 
-// Whether the call reads a column that its operation knows.
-bool reads(const FileCall& call, std::string_view column) {
-  if (column == "u3") return call.operation == Operation::sample_scattering || uses_u3(call.model, call.sampler);
-  if (column == "eta") return call.model.interface == Interface::dielectric;
-  if (column == "f0" || column == "f90") return call.model.interface == Interface::schlick;
-  return true;
-}
-
 // Turns a table's columns into a batch's inputs.
 class Inputs {
  public:
@@ -88,22 +81,19 @@ class Inputs {
     for (const std::string& name : table_.names())
       if (!known_column(name))
         return invalid("{}: unknown column {}; known are{}", shown(), name, known_inputs());
-    for (const FileColumn& column : kInputColumns) {
-      const InputField& field = field_named(input_fields(), column.field);
-      if (const auto given = constant(call_, column.name)) {
-        if (find(column.name) >= 0)
-          return invalid("{}: {} has a column {} too", given->option, shown(), column.name);
+    for (const InputField& field : input_fields()) {
+      const std::string column = file_name(field.name);
+      if (const auto given = constant(call_, column)) {
+        if (find(column) >= 0) return invalid("{}: {} has a column {} too", given->option, shown(), column);
         field.column(batch) = given->value;
         continue;
       }
-      if (!(field.operations & bit(call_.operation))) continue;
-      const bool random = column.name.starts_with("u");
-      if (random && call_.seed) {
-        if (find(column.name) >= 0) return invalid("--seed: {} has a column {} too", shown(), column.name);
+      if (field.random && call_.seed && (field.operations & bit(call_.operation))) {
+        if (find(column) >= 0) return invalid("--seed: {} has a column {} too", shown(), column);
         continue;
       }
-      if (!reads(call_, column.name) || (field.otherwise && find(column.name) < 0)) continue;
-      if (auto status = take(column.name, random, field.column(batch)); !status.ok()) return status;
+      if (!reads(call_.operation, call_.model, call_.sampler, field) || (field.otherwise && find(column) < 0)) continue;
+      if (auto status = take(column, field.random, field.column(batch)); !status.ok()) return status;
     }
     batch.lanes = table_.rows();
     if (call_.seed) batch.generator = {.seed = *call_.seed, .id = {}, .first_id = call_.first_id};
@@ -159,25 +149,15 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   Inputs inputs(call, **input);
   if (auto status = inputs.fill(batch); !status.ok()) return status;
 
+  const auto fields = written_fields(call);
+  const auto bytes = written_bytes(call);
   TableColumns names{.floats = {}, .bytes = {}};
-  for (const FileColumn& column : kOutputColumns)
-    if (computes(call.operation, call.model, field_named(output_fields(), column.field)))
-      names.floats.emplace_back(column.name);
-  for (const FileColumn& column : kByteColumns)
-    if (field_named(byte_fields(), column.field).operations & bit(call.operation))
-      names.bytes.emplace_back(column.name);
+  for (const OutputField* field : fields) names.floats.push_back(file_name(field->name));
+  for (const ByteField* field : bytes) names.bytes.push_back(file_name(field->name));
   auto output = create_table(call.output, names, batch.lanes);
   if (!output.ok()) return output.status();
-  std::size_t index = 0;
-  for (const FileColumn& column : kOutputColumns) {
-    const OutputField& field = field_named(output_fields(), column.field);
-    if (computes(call.operation, call.model, field)) field.column(batch) = (*output)->column(index++);
-  }
-  index = 0;
-  for (const FileColumn& column : kByteColumns) {
-    const ByteField& field = field_named(byte_fields(), column.field);
-    if (field.operations & bit(call.operation)) field.column(batch) = (*output)->byte_column(index++);
-  }
+  for (std::size_t k = 0; k < fields.size(); ++k) fields[k]->column(batch) = (*output)->column(k);
+  for (std::size_t k = 0; k < bytes.size(); ++k) bytes[k]->column(batch) = (*output)->byte_column(k);
 
   const auto start = std::chrono::steady_clock::now();
   auto statistics = engine.run(call.operation, batch);

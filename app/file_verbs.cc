@@ -175,7 +175,7 @@ Example:
 }
 
 Verb add_evaluate(CLI::App& app) {
-  return add_file_verb(app, "evaluate", Operation::evaluate_and_pdf, kEvaluateVariants,
+  return add_file_verb(app, "evaluate", Operation::evaluate_reflection, kEvaluateVariants,
                        "Values f |cos(theta_o)|, and a sampler's density, at outgoing directions of a file",
                        std::string(kFiles) + kQueryColumns + R"(Written:
   pdf              density per steradian with which the sampler draws the outgoing direction

@@ -178,7 +178,7 @@ void add_ggx_smith(std::span<const Sampler> samplers, std::vector<VerifyCase>& c
       cases.push_back({.operation = Operation::sample_normal, .sampler = sampler});
   cases.push_back({.operation = Operation::pdf_reflection, .sampler = samplers.back()});
   cases.push_back({.operation = Operation::evaluate_reflection, .sampler = samplers.back()});
-  cases.push_back({.operation = Operation::evaluate_and_pdf,
+  cases.push_back({.operation = Operation::evaluate_reflection,
                    .model = {.shadowing = Shadowing::uncorrelated},
                    .sampler = samplers[samplers.size() > 1 ? samplers.size() - 2 : 0]});
   cases.push_back({.operation = Operation::masking, .sampler = samplers.back()});
@@ -210,7 +210,6 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
   }
   if (!any || ggx_smith) return;
   const Sampler sampler = samplers.back();
-  cases.push_back({.operation = Operation::evaluate_reflection, .model = composition, .sampler = sampler});
   cases.push_back({.operation = Operation::masking, .model = composition, .sampler = sampler});
 }
 
@@ -227,7 +226,7 @@ std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
   if (std::find(samplers.begin(), samplers.end(), Sampler::visible) == samplers.end()) return cases;
   for (const Distribution distribution : {Distribution::ggx, Distribution::beckmann})
     for (const Operation operation :
-         {Operation::sample_normal, Operation::sample_reflection, Operation::evaluate_and_pdf, Operation::masking})
+         {Operation::sample_normal, Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
       cases.push_back({.operation = operation,
                        .model = {.distribution = distribution},
                        .sampler = Sampler::visible,

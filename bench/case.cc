@@ -73,7 +73,7 @@ std::vector<Case> operations(std::span<const Sampler> query_samplers,
     cases.push_back({.operation = Operation::pdf_reflection, .sampler = sampler});
   cases.push_back({.operation = Operation::evaluate_reflection, .sampler = std::nullopt});
   for (const Sampler sampler : query_samplers)
-    cases.push_back({.operation = Operation::evaluate_and_pdf, .sampler = sampler});
+    cases.push_back({.operation = Operation::evaluate_reflection, .sampler = sampler});
   cases.push_back({.operation = Operation::masking, .sampler = std::nullopt});
   return cases;
 }
@@ -140,7 +140,7 @@ std::vector<Case> standard_cases() {
   // Of the rest, what a path tracer calls with visible normals.
   for (const Case& which : model_cases()) {
     const bool called = which.operation == Operation::sample_scattering ||
-                        (which.operation == Operation::evaluate_and_pdf && which.masking == Masking::smith);
+                        (which.operation == Operation::evaluate_reflection && which.masking == Masking::smith);
     if (called && (which.sampler == Sampler::visible || which.sampler == Sampler::cap)) list.add(which);
   }
   return list.take();
@@ -229,7 +229,7 @@ int Case::input_columns() const {
 
 int Case::output_columns() const {
   if (is_sampling()) return 4;  // a direction and its pdf
-  return operation == Operation::evaluate_and_pdf || scatters() ? 2 : 1;
+  return (operation == Operation::evaluate_reflection && sampler) || scatters() ? 2 : 1;
 }
 
 bool Case::comparable(const Case& other) const {
@@ -319,7 +319,7 @@ int flops(const Case& which) {
   constexpr int kDensity = kPrepare + 2 * kLength + 29;
   int sum = kDensity;
   if (which.operation != Operation::pdf_reflection) sum += kShadowing;
-  if (which.operation != Operation::evaluate_reflection) {
+  if (which.sampler) {
     switch (*which.sampler) {
       case Sampler::ndf:
         sum += 5;

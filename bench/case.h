@@ -26,7 +26,7 @@ struct Case {
   Operation operation = Operation::sample_reflection;
   Distribution distribution = Distribution::ggx;
   Masking masking = Masking::smith;
-  std::optional<Sampler> sampler;  // nothing where the operation has no use for one
+  std::optional<Sampler> sampler;  // nothing where it is not read: evaluate_reflection then gives no pdf
   float alpha_x = 0, alpha_y = 0;
   std::size_t batch = 65536;
   Implementation implementation = Implementation::simd;

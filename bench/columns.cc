@@ -148,8 +148,8 @@ Batch Columns::batch(const Case& which, std::size_t first) const {
       break;
     case Operation::evaluate_reflection:
       batch.out.value = out(0);
+      if (which.sampler) batch.out.pdf = out(1);
       break;
-    case Operation::evaluate_and_pdf:
     case Operation::evaluate_transmission:
     case Operation::evaluate_scattering:
       batch.out.value = out(0);

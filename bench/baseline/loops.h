@@ -113,8 +113,8 @@ std::uint64_t run_sampler(const Loop& loop) {
     case Operation::sample_normal: return sample_normals<model, sampler>(loop);
     case Operation::sample_reflection: return sample_reflections<model, sampler>(loop);
     case Operation::pdf_reflection: return query<model, sampler, false, true>(loop);
-    case Operation::evaluate_reflection: return query<model, sampler, true, false>(loop);
-    case Operation::evaluate_and_pdf: return query<model, sampler, true, true>(loop);
+    case Operation::evaluate_reflection:
+      return loop.pdf == nullptr ? query<model, sampler, true, false>(loop) : query<model, sampler, true, true>(loop);
     case Operation::masking: return mask<model>(loop);
     default: return 0;  // there are none of dielectrics
   }
@@ -127,7 +127,7 @@ std::uint64_t run_model(const Loop& loop) {
     return 0;
   };
   // What has no use for a sampler is the same of each.
-  if (loop.operation == Operation::evaluate_reflection || loop.operation == Operation::masking)
+  if (loop.operation == Operation::masking || (loop.operation == Operation::evaluate_reflection && loop.pdf == nullptr))
     return with.template operator()<Sampler::ndf>();
   switch (loop.sampler) {
     case Sampler::ndf: return with.template operator()<Sampler::ndf>();

@@ -93,7 +93,7 @@ absl::Status check_inputs(Operation operation, const Batch& batch, const BatchCo
     const bool known = fields[k].operations & bit(operation);
     if (!known && !column.present()) continue;
     const absl::string_view field = view(fields[k].name);
-    const bool random = kRandomInputs >> k & 1, read = read_bits >> k & 1;
+    const bool random = fields[k].random, read = read_bits >> k & 1;
     if (!column.present()) {
       const bool needed = read && !fields[k].otherwise && !(random && batch.generator);
       if (!needed) continue;

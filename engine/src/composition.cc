@@ -23,8 +23,9 @@ absl::string_view named(T value) {
   return view(name(value));
 }
 
-bool reads_sampler(Operation operation) {
-  return operation != Operation::evaluate_reflection && operation != Operation::masking;
+bool evaluates(Operation operation) {
+  return operation == Operation::evaluate_reflection || operation == Operation::evaluate_transmission ||
+         operation == Operation::evaluate_scattering;
 }
 
 bool scatters(Operation operation) { return operation >= Operation::sample_transmission; }
@@ -36,8 +37,8 @@ const SurfaceKernels& surface_of(const DistributionKernels& kernels, Masking mas
 }
 
 // Every target has kernels for the same compositions.
-const KernelTable& any_kernels() {
-  static const KernelTable& table = kernels(*resolve(Target::best), false);
+const TargetKernels& any_kernels() {
+  static const TargetKernels& table = kernels(*resolve(Target::best), false);
   return table;
 }
 
@@ -55,20 +56,25 @@ std::string names_of(const std::vector<Sampler>& samplers) {
 
 std::vector<Sampler> samplers_for(Operation operation, const Model& model, bool affine) {
   std::vector<Sampler> samplers;
-  const KernelTable& table = any_kernels();
+  const TargetKernels& table = any_kernels();
   for (const Sampler sampler : all_samplers())
-    if (reads_sampler(operation) && find_kernel(table, operation, model, sampler, affine)) samplers.push_back(sampler);
+    if (operation != Operation::masking && find_kernel(table, operation, model, sampler, affine)) samplers.push_back(sampler);
   return samplers;
 }
 
 }  // namespace
+
+Sampler sampler_of(Operation operation, const Batch& batch) {
+  const bool reads_it = operation != Operation::masking && (!evaluates(operation) || batch.out.pdf.present());
+  return reads_it ? batch.sampler : Sampler::visible;
+}
 
 bool samples(Operation operation) {
   return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
          operation == Operation::sample_transmission || operation == Operation::sample_scattering;
 }
 
-Kernel find_kernel(const KernelTable& table, Operation operation, const Model& model, Sampler sampler, bool affine) {
+Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine) {
   const SurfaceKernels& surface =
       surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine);
   const auto index = static_cast<std::size_t>(sampler);
@@ -76,8 +82,7 @@ Kernel find_kernel(const KernelTable& table, Operation operation, const Model& m
     case Operation::sample_normal: return samples_normals(sampler) ? surface.sample[index] : nullptr;
     case Operation::sample_reflection: return surface.sample[index];
     case Operation::pdf_reflection:
-    case Operation::evaluate_and_pdf: return surface.query[index];
-    case Operation::evaluate_reflection: return surface.query[static_cast<std::size_t>(Sampler::visible)];
+    case Operation::evaluate_reflection: return surface.query[index];
     case Operation::masking: return surface.masking;
     case Operation::sample_transmission:
     case Operation::sample_scattering: return surface.scatter[index];
@@ -130,8 +135,7 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
   if (model.retro && (batch.mean_slope_x.present() || batch.mean_slope_y.present()))
     return invalid("model.retro", "needs normals that are distributed symmetrically about n: not with a mean slope");
 
-  if (!reads_sampler(operation)) return absl::OkStatus();
-  if (find_kernel(any_kernels(), operation, model, batch.sampler, affine)) return absl::OkStatus();
+  if (find_kernel(any_kernels(), operation, model, sampler_of(operation, batch), affine)) return absl::OkStatus();
   const char* with = !affine ? "" : batch.slope_correlation.present() ? " and correlated roughness" : " and a mean slope";
   return invalid("sampler", absl::StrCat(named(batch.sampler), " does not fit ", named(operation), " of ", model_name(model),
                                          with, "; what does: ", names_of(samplers_for(operation, model, affine))));

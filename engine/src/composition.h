@@ -13,6 +13,8 @@ absl::Status check_composition(Operation operation, const Batch& batch);
 inline bool is_affine(const Batch& batch) {
   return batch.mean_slope_x.present() || batch.mean_slope_y.present() || batch.slope_correlation.present();
 }
+// The batch's sampler, or `visible`, which every model has, where the operation does not read it.
+Sampler sampler_of(Operation operation, const Batch& batch);
 // Whether the operation draws random numbers.
 bool samples(Operation operation);
 

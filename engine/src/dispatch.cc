@@ -24,17 +24,17 @@ namespace HWY_NAMESPACE {
 FACETWISE_DISTRIBUTIONS(FACETWISE_DECLARE)
 #undef FACETWISE_DECLARE
 
-extern const KernelTable kTable;
-extern const KernelTable kOneLaneTable;
+extern const TargetKernels kTable;
+extern const TargetKernels kOneLaneTable;
 #define FACETWISE_ENTRY(Name) &k##Name,
-const KernelTable kTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)},
+const TargetKernels kTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)},
                             Philox<hn::ScalableTag<float>>,
                             hn::MaxLanes(hn::ScalableTag<float>()),
                             kStreams<hn::ScalableTag<float>>,
                             hwy::FlushStream};
 #undef FACETWISE_ENTRY
 #define FACETWISE_ENTRY(Name) &kOneLane##Name,
-const KernelTable kOneLaneTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1, false,
+const TargetKernels kOneLaneTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1, false,
                                    hwy::FlushStream};
 #undef FACETWISE_ENTRY
 
@@ -49,8 +49,8 @@ namespace {
 struct CompiledTarget {
   Target target;
   std::int64_t highway;
-  const KernelTable* table;
-  const KernelTable* one_lane;
+  const TargetKernels* table;
+  const TargetKernels* one_lane;
 };
 
 // Best first.
@@ -92,7 +92,7 @@ std::optional<Target> resolve(Target target) {
   return std::nullopt;
 }
 
-const KernelTable& kernels(Target target, bool one_lane) {
+const TargetKernels& kernels(Target target, bool one_lane) {
   const CompiledTarget* found = &kCompiled[0];
   for (const CompiledTarget& compiled : kCompiled)
     if (compiled.target == target) found = &compiled;

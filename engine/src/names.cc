@@ -45,7 +45,6 @@ constexpr Named<Operation> kOperations[] = {{Operation::sample_normal, "sample_n
                                             {Operation::sample_reflection, "sample_reflection"},
                                             {Operation::pdf_reflection, "pdf_reflection"},
                                             {Operation::evaluate_reflection, "evaluate_reflection"},
-                                            {Operation::evaluate_and_pdf, "evaluate_and_pdf"},
                                             {Operation::masking, "masking"},
                                             {Operation::sample_transmission, "sample_transmission"},
                                             {Operation::evaluate_transmission, "evaluate_transmission"},

@@ -57,12 +57,12 @@ bool streams(const Plan& plan, const Execution& execution) {
 
 }  // namespace
 
-void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const KernelTable& table,
+void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
                const Execution& execution, Plan& plan) {
   const Model& model = batch.model;
   plan.table = &table;
   const bool affine = is_affine(batch);
-  plan.kernel = find_kernel(table, operation, model, batch.sampler, affine);
+  plan.kernel = find_kernel(table, operation, model, sampler_of(operation, batch), affine);
   plan.active = batch.active ? batch.active->data() : nullptr;
   plan.positions = batch.active ? batch.active->size() : batch.lanes;
   plan.generator = batch.generator ? &*batch.generator : nullptr;
@@ -78,10 +78,10 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
     plan.per_lane[plan.per_lane_count++] = {index, column, contiguous};
     plan.buffers |= !contiguous;
   }
-  // Kernels of affine surfaces, and tables', read all moments.
-  constexpr unsigned kMoments = 1u << kMeanX | 1u << kMeanY | 1u << kCorrelation;
+  // Kernels of affine surfaces, and tables', read all of these.
+  constexpr unsigned kAffineInputs = 1u << kMeanX | 1u << kMeanY | 1u << kCorrelation;
   unsigned missing = read & kOptionalInputs & ~columns.in_bits;
-  if (!affine && model.distribution != Distribution::table) missing &= ~kMoments;
+  if (!affine && model.distribution != Distribution::table) missing &= ~kAffineInputs;
   for (; missing != 0; missing &= missing - 1) {
     const auto index = static_cast<unsigned>(std::countr_zero(missing));
     plan.one_value[plan.one_value_count++] = {index, *input_fields()[index].otherwise};

@@ -11,7 +11,7 @@
 namespace facetwise {
 
 struct Plan {
-  const KernelTable* table = nullptr;
+  const TargetKernels* table = nullptr;
   Kernel kernel = nullptr;
   std::size_t positions = 0;  // lanes, or entries of the active list
   const std::uint32_t* active = nullptr;
@@ -47,7 +47,7 @@ struct Plan {
 };
 
 // The batch is checked; it and `columns` live as long as the plan.
-void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const KernelTable& table,
+void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
                const Execution& execution, Plan& plan);
 
 }  // namespace facetwise

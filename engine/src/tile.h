@@ -66,7 +66,7 @@ struct PhiloxTile {
 // The kernels of a distribution with a masking, indexed by Sampler; entries that do not exist are null.
 struct SurfaceKernels {
   Kernel sample[6] = {};         // sample_normal, sample_reflection
-  Kernel query[6] = {};          // pdf_reflection, evaluate_reflection, evaluate_and_pdf
+  Kernel query[6] = {};          // pdf_reflection, evaluate_reflection
   Kernel scatter[6] = {};        // sample_transmission, sample_scattering
   Kernel scatter_query[6] = {};  // evaluate_transmission, evaluate_scattering
   Kernel masking = nullptr;
@@ -77,7 +77,7 @@ struct DistributionKernels {
   SurfaceKernels smith, smith_affine, vcavity;
 };
 
-struct KernelTable {
+struct TargetKernels {
   const DistributionKernels* distribution[5];  // indexed by Distribution; null at the end where there are no more
   void (*philox)(const PhiloxTile& tile);
   std::size_t vector_lanes;
@@ -86,9 +86,9 @@ struct KernelTable {
 };
 
 // The kernels of an available target (target.h), full vectors or one lane wide.
-const KernelTable& kernels(Target target, bool one_lane);
+const TargetKernels& kernels(Target target, bool one_lane);
 
 // A batch's kernel, null where the composition has none. `affine`: mean slopes or correlations are given.
-Kernel find_kernel(const KernelTable& table, Operation operation, const Model& model, Sampler sampler, bool affine);
+Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine);
 
 }  // namespace facetwise

@@ -1,55 +1,37 @@
 #include "wire/fields.h"
 
 #include <algorithm>
+#include <cctype>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace facetwise::wire {
 namespace {
 
-using Request = v1::BatchRequest;
-using Response = v1::BatchResponse;
+// The place of "incident.x" or "pdf" in a message. A field that the message has not is a mistake in the protocol, which
+// every program would stop at.
+ColumnPlace place_of(const google::protobuf::Descriptor& message, std::string_view name, std::string_view member) {
+  const std::size_t dot = member.find('.');
+  const auto* field = message.FindFieldByName(std::string(member.substr(0, dot)));
+  if (field == nullptr) throw std::logic_error("the protocol lacks " + std::string(name));
+  return {name, field->number(), dot == std::string_view::npos ? 0 : member[dot + 1] - 'x' + 1};
+}
 
-constexpr std::array<ColumnPlace, 17> kInputPlaces = {{
-    {"incident.x", Request::kIncidentFieldNumber, 1},
-    {"incident.y", Request::kIncidentFieldNumber, 2},
-    {"incident.z", Request::kIncidentFieldNumber, 3},
-    {"alpha_x", Request::kAlphaXFieldNumber, 0},
-    {"alpha_y", Request::kAlphaYFieldNumber, 0},
-    {"mean_slope_x", Request::kMeanSlopeXFieldNumber, 0},
-    {"mean_slope_y", Request::kMeanSlopeYFieldNumber, 0},
-    {"slope_correlation", Request::kSlopeCorrelationFieldNumber, 0},
-    {"eta", Request::kEtaFieldNumber, 0},
-    {"f0", Request::kF0FieldNumber, 0},
-    {"f90", Request::kF90FieldNumber, 0},
-    {"outgoing.x", Request::kOutgoingFieldNumber, 1},
-    {"outgoing.y", Request::kOutgoingFieldNumber, 2},
-    {"outgoing.z", Request::kOutgoingFieldNumber, 3},
-    {"u1", Request::kU1FieldNumber, 0},
-    {"u2", Request::kU2FieldNumber, 0},
-    {"u3", Request::kU3FieldNumber, 0},
-}};
-
-constexpr std::array<OutputPlace, 15> kOutputPlaces = {{
-    {"out.outgoing.x", Response::kOutgoingFieldNumber, 1, v1::OUTGOING},
-    {"out.outgoing.y", Response::kOutgoingFieldNumber, 2, v1::OUTGOING},
-    {"out.outgoing.z", Response::kOutgoingFieldNumber, 3, v1::OUTGOING},
-    {"out.normal.x", Response::kNormalFieldNumber, 1, v1::NORMAL},
-    {"out.normal.y", Response::kNormalFieldNumber, 2, v1::NORMAL},
-    {"out.normal.z", Response::kNormalFieldNumber, 3, v1::NORMAL},
-    {"out.incident_dot_normal", Response::kIncidentDotNormalFieldNumber, 0, v1::INCIDENT_DOT_NORMAL},
-    {"out.pdf", Response::kPdfFieldNumber, 0, v1::PDF},
-    {"out.weight", Response::kWeightFieldNumber, 0, v1::WEIGHT},
-    {"out.value", Response::kValueFieldNumber, 0, v1::VALUE},
-    {"out.masking", Response::kMaskingFieldNumber, 0, v1::MASKING_G1},
-    {"out.projected_area", Response::kProjectedAreaFieldNumber, 0, v1::PROJECTED_AREA},
-    {"out.share_unoccluded", Response::kShareUnoccludedFieldNumber, 0, v1::SHARE_UNOCCLUDED},
-    {"out.branch_probability", Response::kBranchProbabilityFieldNumber, 0, v1::BRANCH_PROBABILITY},
-    {"out.eta_scale", Response::kEtaScaleFieldNumber, 0, v1::ETA_SCALE},
-}};
-
-constexpr std::array<OutputPlace, 2> kBytePlaces = {{
-    {"out.status", Response::kStatusFieldNumber, 0, v1::STATUS},
-    {"out.event", Response::kEventFieldNumber, 0, v1::EVENT},
-}};
+template <class Fields>
+std::vector<OutputPlace> places_of_outputs(const Fields& fields) {
+  std::vector<OutputPlace> places;
+  for (const auto& field : fields) {
+    const std::string_view member = field.name.substr(std::string_view("out.").size());
+    const ColumnPlace place = place_of(*v1::BatchResponse::descriptor(), field.name, member);
+    std::string output(member.substr(0, member.find('.')));
+    for (char& c : output) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    if (output == "MASKING") output = "MASKING_G1";  // MASKING is an operation
+    OutputPlace& added = places.emplace_back(OutputPlace{place.name, place.field, place.part, v1::OUTPUT_UNSPECIFIED});
+    if (!v1::Output_Parse(output, &added.output)) throw std::logic_error("the protocol lacks the output " + output);
+  }
+  return places;
+}
 
 // The protocol's values are the library's plus one: 0 is "unspecified".
 static_assert(v1::SAMPLE_NORMAL == static_cast<int>(Operation::sample_normal) + 1);
@@ -82,9 +64,23 @@ P to(T value) {
 
 }  // namespace
 
-std::span<const ColumnPlace> input_places() { return kInputPlaces; }
-std::span<const OutputPlace> output_places() { return kOutputPlaces; }
-std::span<const OutputPlace> byte_places() { return kBytePlaces; }
+std::span<const ColumnPlace> input_places() {
+  static const std::vector<ColumnPlace> places = [] {
+    std::vector<ColumnPlace> result;
+    for (const InputField& field : input_fields())
+      result.push_back(place_of(*v1::BatchRequest::descriptor(), field.name, field.name));
+    return result;
+  }();
+  return places;
+}
+std::span<const OutputPlace> output_places() {
+  static const std::vector<OutputPlace> places = places_of_outputs(output_fields());
+  return places;
+}
+std::span<const OutputPlace> byte_places() {
+  static const std::vector<OutputPlace> places = places_of_outputs(byte_fields());
+  return places;
+}
 
 std::optional<Operation> operation_from(int value) { return from(value, Operation::evaluate_scattering, {}); }
 std::optional<Distribution> distribution_from(int value) {
@@ -126,10 +122,12 @@ Sampler default_sampler(Operation operation, const Model& model) {
 
 unsigned outputs_of(Operation operation) {
   unsigned outputs = 0;
-  for (std::size_t k = 0; k < kOutputPlaces.size(); ++k)
-    if (output_fields()[k].operations & bit(operation)) outputs |= 1u << kOutputPlaces[k].output;
-  for (std::size_t k = 0; k < kBytePlaces.size(); ++k)
-    if (byte_fields()[k].operations & bit(operation)) outputs |= 1u << kBytePlaces[k].output;
+  const auto add = [&](const auto& fields, const auto& places) {
+    for (std::size_t k = 0; k < places.size(); ++k)
+      if (fields[k].operations & bit(operation)) outputs |= 1u << places[k].output;
+  };
+  add(output_fields(), output_places());
+  add(byte_fields(), byte_places());
   return outputs;
 }
 

@@ -40,7 +40,7 @@ std::vector<Case> cases() {
        Sampler::heitz,
        {"mx", "my", "mz", "pdf"}},
       {"pdf", {"pdf", "--sampler", "bounded"}, Operation::pdf_reflection, Sampler::bounded, {"pdf"}},
-      {"evaluate", {"evaluate"}, Operation::evaluate_and_pdf, Sampler::exact, {"pdf", "value"}},
+      {"evaluate", {"evaluate"}, Operation::evaluate_reflection, Sampler::exact, {"pdf", "value"}},
   };
 }
 

@@ -34,7 +34,7 @@ TEST_F(Cases, FullHasEveryCombination) {
        {"sample_normal/ndf", "sample_normal/heitz", "sample_normal/cap", "sample_reflection/ndf",
         "sample_reflection/heitz", "sample_reflection/cap", "sample_reflection/bounded",
         "sample_reflection/exact", "pdf_reflection/ndf", "pdf_reflection/exact", "evaluate_reflection/none",
-        "evaluate_and_pdf/cap", "evaluate_and_pdf/exact", "masking/none"})
+        "evaluate_reflection/cap", "evaluate_reflection/exact", "masking/none"})
     for (const char* alpha : {"mixed", "0.01,0.01", "0.3,0.3", "1,1", "0.8,0.1"})
       for (const char* batch : {"256", "4096", "65536", "1048576", "16777216"})
         for (const char* implementation : {"scalar", "one-lane", "simd", "simd-threads", "remote"}) {
@@ -108,7 +108,7 @@ TEST(Case, BytesAreThoseOfTheColumns) {
   EXPECT_EQ(describe(which).bytes_per_sample, 4.0 * (3 + 2 + 4));
   which.inputs = Inputs::one_roughness;
   EXPECT_EQ(describe(which).bytes_per_sample, 4.0 * (3 + 3 + 4));
-  EXPECT_EQ(describe({.operation = Operation::evaluate_and_pdf, .sampler = Sampler::exact}).bytes_per_sample,
+  EXPECT_EQ(describe({.operation = Operation::evaluate_reflection, .sampler = Sampler::exact}).bytes_per_sample,
             4.0 * (3 + 2 + 3 + 2));
   EXPECT_EQ(describe({.operation = Operation::masking, .sampler = std::nullopt}).bytes_per_sample,
             4.0 * (3 + 2 + 1));

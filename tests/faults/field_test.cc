@@ -26,7 +26,7 @@ template <class Body>
 void for_each_output(bool known, const Body& body) {
   for (const Call& call : plain_calls())
     for (const OutputField& field : output_fields())
-      if (((field.operations & bit(call.operation)) != 0) == known) body(call, field);
+      if (known ? writes(call, field) : !(field.operations & bit(call.operation))) body(call, field);
 }
 
 TEST(Field, WholeCallsAreAccepted) {

@@ -31,7 +31,7 @@ TEST(Names, RoundTrip) {
                     parse_sampler);
   expect_round_trip({Target::best, Target::scalar, Target::avx2, Target::avx3, Target::neon}, parse_target);
   expect_round_trip({Operation::sample_normal, Operation::sample_reflection, Operation::pdf_reflection,
-                     Operation::evaluate_reflection, Operation::evaluate_and_pdf, Operation::masking,
+                     Operation::evaluate_reflection, Operation::masking,
                      Operation::sample_transmission, Operation::evaluate_transmission, Operation::sample_scattering,
                      Operation::evaluate_scattering},
                     parse_operation);

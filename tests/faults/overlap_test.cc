@@ -16,7 +16,7 @@ struct Present {
     for (const InputField& field : input_fields())
       if (reads(call, field)) in.push_back(&field);
     for (const OutputField& field : output_fields())
-      if (field.operations & bit(call.operation)) out.push_back(&field);
+      if (writes(call, field)) out.push_back(&field);
   }
 };
 

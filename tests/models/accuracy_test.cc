@@ -161,7 +161,7 @@ TEST_P(ModelAccuracy, DensitiesOfReflections) {
 TEST_P(ModelAccuracy, Values) {
   Row row;
   std::uint64_t seed = 1000;
-  for (const Composition& c : compositions(GetParam(), Operation::evaluate_and_pdf)) {
+  for (const Composition& c : compositions(GetParam(), Operation::evaluate_reflection)) {
     if (c.sampler != Sampler::visible) continue;  // values know no sampler
     const std::vector<Point> points = hard_points(c, 2 * points_each(), ++seed);
     const std::vector<Result> results = run_points(Operation::evaluate_reflection, c, points);

@@ -61,7 +61,7 @@ struct Cells {
 std::vector<ChiSquare> test_reflections(const Composition& c, const Point& point,
                                         const std::vector<Point>& claimed, std::uint64_t seed) {
   const reference::Surface s = surface_of(c, point);
-  const Grid grid = make_grid(Operation::evaluate_and_pdf, c, point, kSide);
+  const Grid grid = make_grid(Operation::evaluate_reflection, c, point, kSide);
   const Cells cells(grid, 0);
   std::vector<std::uint64_t> counts(Cells::kGroups * Cells::kGroups + 1);
   const Vector i = incident(point), from = c.model.retro ? turned(i) : i;
@@ -88,7 +88,7 @@ std::vector<ChiSquare> test_reflections(const Composition& c, const Point& point
         places.push_back({n, area * 4 * dot(from, m)});
       }
       std::fill(expected.begin(), expected.end(), 0.0);
-      const std::vector<Result> results = run_points(Operation::evaluate_and_pdf, c, points);
+      const std::vector<Result> results = run_points(Operation::evaluate_reflection, c, points);
       for (std::size_t n = 0; n < points.size(); ++n)
         expected[cells.at(places[n].first)] += places[n].second * results[n].pdf * kCount;
     }

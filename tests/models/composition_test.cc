@@ -37,7 +37,7 @@ std::string refused(Operation operation, const Composition& c, std::string_view 
 }
 
 constexpr Operation kSampled[] = {Operation::sample_normal,       Operation::sample_reflection,
-                                  Operation::pdf_reflection,      Operation::evaluate_and_pdf,
+                                  Operation::pdf_reflection,      Operation::evaluate_reflection,
                                   Operation::sample_transmission, Operation::evaluate_transmission,
                                   Operation::sample_scattering,   Operation::evaluate_scattering};
 
@@ -75,8 +75,6 @@ TEST_P(ModelComposition, SamplersForIsWhatRunTakes) {
     EXPECT_EQ(samplers_for(operation, model), samplers_of(GetParam(), operation)) << name(operation);
   }
   EXPECT_TRUE(samplers_for(Operation::masking, plain(GetParam(), Sampler::visible).model).empty());
-  EXPECT_TRUE(
-      samplers_for(Operation::evaluate_reflection, plain(GetParam(), Sampler::visible).model).empty());
 }
 
 // Every family has `ndf` and `visible`, for normals and reflections; samplers of reflections alone draw no
@@ -93,11 +91,21 @@ TEST_P(ModelComposition, NdfAndVisibleAlwaysFit) {
   }
 }
 
-// Values and masking are no sampler's: any is taken.
+// Values and masking are no sampler's: any is taken as long as no pdf is asked for.
 TEST_P(ModelComposition, ValuesTakeAnySampler) {
+  const std::vector<Point> points(5);
   for (const Sampler sampler : all_samplers()) {
-    run_points(Operation::evaluate_reflection, plain(GetParam(), sampler), std::vector<Point>(5));
-    run_points(Operation::masking, plain(GetParam(), sampler), std::vector<Point>(5));
+    Composition c = plain(GetParam(), sampler);
+    run_points(Operation::masking, c, points);
+    for (const Operation operation :
+         {Operation::evaluate_reflection, Operation::evaluate_transmission, Operation::evaluate_scattering}) {
+      if (operation >= Operation::sample_transmission) c.model.interface = Interface::dielectric;
+      std::vector<Result> results(points.size());
+      Batch batch = make_batch(operation, c, points, results);
+      batch.out.pdf = {};
+      const auto statistics = run(operation, batch);
+      EXPECT_TRUE(statistics.ok()) << statistics.status();
+    }
   }
 }
 
@@ -119,12 +127,12 @@ TEST_P(ModelComposition, ColumnsFollowTheInterface) {
     c.model.interface = interface;
     return c;
   };
-  refused(Operation::evaluate_and_pdf, with(Interface::conductor), "eta", [](Batch& b) { b.eta = 1.5f; });
-  refused(Operation::evaluate_and_pdf, with(Interface::conductor), "f0", [](Batch& b) { b.f0 = 0.5f; });
-  refused(Operation::evaluate_and_pdf, with(Interface::schlick), "eta", [](Batch& b) { b.eta = 1.5f; });
-  refused(Operation::evaluate_and_pdf, with(Interface::schlick), "f0", [](Batch& b) { b.f0 = {}; });
-  refused(Operation::evaluate_and_pdf, with(Interface::dielectric), "f90", [](Batch& b) { b.f90 = 1.0f; });
-  refused(Operation::evaluate_and_pdf, with(Interface::dielectric), "eta", [](Batch& b) { b.eta = {}; });
+  refused(Operation::evaluate_reflection, with(Interface::conductor), "eta", [](Batch& b) { b.eta = 1.5f; });
+  refused(Operation::evaluate_reflection, with(Interface::conductor), "f0", [](Batch& b) { b.f0 = 0.5f; });
+  refused(Operation::evaluate_reflection, with(Interface::schlick), "eta", [](Batch& b) { b.eta = 1.5f; });
+  refused(Operation::evaluate_reflection, with(Interface::schlick), "f0", [](Batch& b) { b.f0 = {}; });
+  refused(Operation::evaluate_reflection, with(Interface::dielectric), "f90", [](Batch& b) { b.f90 = 1.0f; });
+  refused(Operation::evaluate_reflection, with(Interface::dielectric), "eta", [](Batch& b) { b.eta = {}; });
 }
 
 // Operations that have no use for the reflectance run with any interface.
@@ -167,7 +175,7 @@ TEST(ModelRefusals, MomentsAreRefusedByTheOthers) {
     if (family.affine || (family.masking == Masking::smith && family.distribution != Distribution::student_t))
       continue;
     for (const Operation operation :
-         {Operation::sample_reflection, Operation::evaluate_and_pdf, Operation::masking})
+         {Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
       for (const Moment& moment : kMoments)
         refused(operation, plain(family, Sampler::visible), moment.field,
                 [&](Batch& batch) { batch.*moment.column = 0.25f; });

@@ -171,7 +171,7 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
     if (c.model.masking == Masking::smith) b.out.masking = out(&Result::masking);
     b.out.projected_area = out(&Result::area);
   } else {
-    if (operation != Operation::evaluate_reflection) b.out.pdf = out(&Result::pdf);
+    b.out.pdf = out(&Result::pdf);
     if (operation != Operation::pdf_reflection) b.out.value = out(&Result::value);
   }
   if (operation == Operation::sample_scattering || operation == Operation::evaluate_scattering)

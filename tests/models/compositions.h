@@ -122,7 +122,7 @@ std::vector<Result> draw(Operation operation, const Composition& composition, co
                          std::size_t count, std::uint64_t seed, Statistics* statistics = nullptr);
 
 // A grid of side^2 standard slopes: t = atan(r) in [0, pi/2] and the azimuth, both in equal parts, t of the
-// part of [0, pi/2] that answers. What an operation (evaluate_and_pdf, evaluate_transmission or
+// part of [0, pi/2] that answers. What an operation (evaluate_reflection, evaluate_transmission or
 // evaluate_scattering) answers for what a microfacet somewhere in each cell does to i, times the cell's part
 // of the sphere of o. Not in the middle: edges of a density may run along the grid.
 struct Grid {

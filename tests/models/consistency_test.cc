@@ -59,7 +59,7 @@ TEST_P(ModelConsistency, SamplesAgreeWithQueries) {
       points[n].oy = samples[n].oy;
       points[n].oz = samples[n].oz;
     }
-    const std::vector<Result> queries = run_points(Operation::evaluate_and_pdf, c, points);
+    const std::vector<Result> queries = run_points(Operation::evaluate_reflection, c, points);
     for (std::size_t n = 0; n < points.size(); ++n) {
       const Result &sample = samples[n], &query = queries[n];
       if (!accepted(sample)) {
@@ -253,7 +253,7 @@ std::vector<Point> corrupted(std::vector<Point> points, std::uint64_t seed) {
 }
 
 std::vector<Operation> operations() {
-  return {Operation::sample_normal,     Operation::sample_reflection,   Operation::evaluate_and_pdf,
+  return {Operation::sample_normal,     Operation::sample_reflection,   Operation::evaluate_reflection,
           Operation::masking,           Operation::sample_transmission, Operation::evaluate_transmission,
           Operation::sample_scattering, Operation::evaluate_scattering};
 }

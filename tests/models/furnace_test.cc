@@ -32,7 +32,7 @@ TEST_P(ModelFurnace, MeanWeightIsTheAlbedo) {
         if (interface != Interface::conductor && n % 2 == 0) continue;
         const double albedo = reference::albedo(surface_of(c, points[n]), incident(points[n]));
         EXPECT_LE(albedo, 1 + 1e-6) << describe(c) << describe(points[n]);
-        const Integral integral = integrate(Operation::evaluate_and_pdf, c, points[n], kQuick ? 96 : 256);
+        const Integral integral = integrate(Operation::evaluate_reflection, c, points[n], kQuick ? 96 : 256);
         if (points[n].iz > 0 || sees_behind(c.model)) {
           EXPECT_NEAR(integral.value, albedo, integral.error + (kQuick ? 5e-3 : 1e-3) * albedo)
               << describe(c) << describe(points[n]);
@@ -82,7 +82,7 @@ TEST_P(ModelFurnace, WeightsOfVisibleNormalsAreAtMostOne) {
 TEST_P(ModelFurnace, ReflectionIsReciprocal) {
   std::uint64_t seed = 70;
   double worst = 0;
-  for (const Composition& c : compositions(GetParam(), Operation::evaluate_and_pdf)) {
+  for (const Composition& c : compositions(GetParam(), Operation::evaluate_reflection)) {
     if (c.sampler != Sampler::visible) continue;
     std::vector<Point> points = hard_points(c, kQuick ? 256 : 4096, ++seed), back;
     std::erase_if(points, [](const Point& p) { return p.iz < 0.02f || p.oz < 0.02f; });

@@ -34,7 +34,7 @@ TEST_P(ModelIntegrals, DensityIsTheShareAccepted) {
       c.model.retro = retro;
       std::uint64_t seed = 1;
       for (const Point& point : calm_points(c)) {
-        const Integral integral = integrate(Operation::evaluate_and_pdf, c, point, kSide);
+        const Integral integral = integrate(Operation::evaluate_reflection, c, point, kSide);
         const double share = share_accepted(c, point, ++seed);
         EXPECT_LE(integral.error, kQuick ? 0.05 : 0.01) << describe(c) << describe(point);
         EXPECT_NEAR(integral.pdf, share, tolerance(share, integral)) << describe(c) << describe(point);
@@ -65,8 +65,8 @@ TEST_P(ModelIntegrals, BiasedNormalisationLosesBehind) {
           point.iz <= 0 && !sees_behind(unbiased.model)
               ? 1
               : reference::normaliser(s, incident(point)) / reference::normaliser(b, incident(point));
-      const Integral with = integrate(Operation::evaluate_and_pdf, biased, point, kSide),
-                     without = integrate(Operation::evaluate_and_pdf, unbiased, point, kSide);
+      const Integral with = integrate(Operation::evaluate_reflection, biased, point, kSide),
+                     without = integrate(Operation::evaluate_reflection, unbiased, point, kSide);
       // `ndf` normalises by nothing, samplers of unoccluded reflections by their own areas.
       const bool own = sampler == Sampler::ndf || (point.iz > 0 && !samples_normals(sampler));
       EXPECT_NEAR(with.pdf, without.pdf * (own ? 1 : loss), with.error + without.error + 1e-5)

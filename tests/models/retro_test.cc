@@ -34,12 +34,12 @@ class ModelRetro : public testing::TestWithParam<Family> {
 
 TEST_P(ModelRetro, IsTheTurnedIncidence) {
   std::uint64_t seed = 1;
-  for (const Composition& c : retros(Operation::evaluate_and_pdf)) {
+  for (const Composition& c : retros(Operation::evaluate_reflection)) {
     const std::vector<Point> points = without_mean(hard_points(c, kLanes, ++seed));
     std::vector<Point> plain = points;
     for (Point& p : plain) p.ix = -p.ix, p.iy = -p.iy;
-    const std::vector<Result> retro = run_points(Operation::evaluate_and_pdf, c, points),
-                              turned = run_points(Operation::evaluate_and_pdf, without(c), plain);
+    const std::vector<Result> retro = run_points(Operation::evaluate_reflection, c, points),
+                              turned = run_points(Operation::evaluate_reflection, without(c), plain);
     std::size_t lit = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {
       // Straight up, the azimuth that some samplers go by is no turned one.
@@ -76,7 +76,7 @@ TEST_P(ModelRetro, SamplesAreTurned) {
 
 TEST_P(ModelRetro, IsSymmetric) {
   std::uint64_t seed = 200;
-  for (const Composition& c : retros(Operation::evaluate_and_pdf)) {
+  for (const Composition& c : retros(Operation::evaluate_reflection)) {
     if (c.sampler != Sampler::visible) continue;
     std::vector<Point> points = without_mean(hard_points(c, kLanes, ++seed)), back;
     std::erase_if(points, [](const Point& p) { return p.iz < 0.02f || p.oz < 0.02f; });

@@ -333,7 +333,7 @@ TEST_P(Accuracy, PdfReflection) {
 }
 
 TEST_P(Accuracy, EvaluateAndPdf) {
-  compare(Operation::evaluate_and_pdf, {}, GetParam(), kLanes / 5, query(GetParam(), {}),
+  compare(Operation::evaluate_reflection, {}, GetParam(), kLanes / 5, query(GetParam(), {}),
           {{kPdf, 8, 64, 24}, {kValue, 8, 64, 24}});
 }
 

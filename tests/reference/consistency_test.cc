@@ -64,7 +64,7 @@ TEST_P(Consistency, SampledPdfIsThePdf) {
   query.outgoing = {o[0], o[1], o[2]};
   query.out.pdf = again;
   query.out.value = value;
-  ASSERT_TRUE(evaluate_and_pdf(query).ok());
+  ASSERT_TRUE(evaluate_reflection(query).ok());
 
   std::vector<double> differences;
   double worst = 0, worst_ratio = 0, worst_value = 0;

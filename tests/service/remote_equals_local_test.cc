@@ -77,8 +77,7 @@ Outputs make_outputs(Operation operation, Batch& batch, Shape shape, bool some) 
 
 bool takes(Operation operation, Sampler sampler) {
   if (operation == Operation::sample_normal) return samples_normals(sampler);
-  if (operation == Operation::evaluate_reflection || operation == Operation::masking)
-    return sampler == Sampler::cap;
+  if (operation == Operation::masking) return sampler == Sampler::cap;
   return true;
 }
 

@@ -81,6 +81,7 @@ bool reads(const Call& call, const InputField& field) {
 }
 
 bool writes(const Call& call, const OutputField& field) {
+  if (call.values_alone && field.name == "out.pdf") return false;
   return computes(call.operation, call.model, field);
 }
 
@@ -94,7 +95,7 @@ std::string call_name(const Call& call) {
     append(model.distribution);
     text.append("-").append(name(model.masking));
   }
-  if (call.operation != Operation::masking && call.operation != Operation::evaluate_reflection) append(call.sampler);
+  if (call.operation != Operation::masking && !call.values_alone) append(call.sampler);
   if (call.shadowing == Shadowing::uncorrelated) append(call.shadowing);
   if (model.normalisation != Normalisation::unbiased) append(model.normalisation);
   if (model.interface != Interface::conductor) append(model.interface);
@@ -108,18 +109,16 @@ void PrintTo(const Call& call, std::ostream* to) { *to << call_name(call); }
 
 namespace {
 
-bool takes_no_sampler(Operation operation) {
-  return operation == Operation::masking || operation == Operation::evaluate_reflection;
-}
-
 // GGX with Smith masking, a conductor.
 void add_plain(std::vector<Call>& calls) {
   for (const Operation operation : all_operations()) {
     if (operation >= Operation::sample_transmission) continue;
-    const bool shadowed = operation == Operation::sample_reflection ||
-                          operation == Operation::evaluate_reflection || operation == Operation::evaluate_and_pdf;
+    const bool shadowed = operation == Operation::sample_reflection || operation == Operation::evaluate_reflection;
+    if (operation == Operation::evaluate_reflection)
+      for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated})
+        calls.push_back({.operation = operation, .sampler = Sampler::cap, .shadowing = shadowing, .values_alone = true});
     for (const Sampler sampler : all_samplers()) {
-      if (takes_no_sampler(operation) && sampler != Sampler::cap) continue;
+      if (operation == Operation::masking && sampler != Sampler::cap) continue;
       if (sampler == Sampler::visible) continue;  // `cap`
       if (operation == Operation::sample_normal && !samples_normals(sampler)) continue;
       calls.push_back({operation, sampler, Shadowing::correlated});
@@ -149,15 +148,16 @@ void add_model(const Model& model, bool moments, std::vector<Call>& calls) {
   for (const Operation operation : all_operations()) {
     Model varied = model;
     if (operation >= Operation::sample_transmission) varied.interface = Interface::dielectric;
-    auto samplers = samplers_for(operation, varied);
-    if (takes_no_sampler(operation)) samplers = {Sampler::visible};
-    for (const Sampler sampler : samplers) {
-      Call call{operation, sampler, Shadowing::correlated, varied, moments};
+    const auto add = [&](Sampler sampler, bool values_alone) {
+      Call call{operation, sampler, Shadowing::correlated, varied, moments, values_alone};
       vary(call, ++turn);
       const auto same = [&](const Call& other) { return call_name(other) == call_name(call); };
-      if (std::any_of(calls.begin(), calls.end(), same)) continue;  // plain GGX
+      if (std::any_of(calls.begin(), calls.end(), same)) return;  // plain GGX
       if (!moments || fits(call)) calls.push_back(call);
-    }
+    };
+    if (operation == Operation::evaluate_reflection) add(Sampler::visible, true);
+    if (operation == Operation::masking) add(Sampler::visible, false);
+    for (const Sampler sampler : samplers_for(operation, varied)) add(sampler, false);
   }
 }
 

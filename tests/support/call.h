@@ -23,6 +23,7 @@ struct Call {
   Shadowing shadowing;
   Model model{};         // but for its shadowing
   bool moments = false;  // mean slopes and correlated roughness too
+  bool values_alone = false;  // evaluate_reflection without its pdf, for which the sampler is not read
 };
 std::string call_name(const Call& call);
 void PrintTo(const Call& call, std::ostream* to);  // for GoogleTest

@@ -5,7 +5,7 @@
 #define HWY_TARGET_INCLUDE "table/lanes_test.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
 #include "hwy/highway.h"
-#include "src/math/table-inl.h"
+#include "src/math/slope_table-inl.h"
 
 #ifndef FACETWISE_TABLE_LANES
 #define FACETWISE_TABLE_LANES

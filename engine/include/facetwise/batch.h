@@ -17,8 +17,7 @@ namespace facetwise {
 //   sample_normal          incident roughness random         normal incident_dot_normal pdf [1/sr of m] status
 //   sample_reflection      incident roughness random         outgoing normal incident_dot_normal pdf weight status
 //   pdf_reflection         incident roughness outgoing       pdf status
-//   evaluate_reflection    incident roughness outgoing       value status
-//   evaluate_and_pdf       incident roughness outgoing       value pdf status
+//   evaluate_reflection    incident roughness outgoing       value pdf status
 //   masking                incident roughness                masking projected_area share_unoccluded status
 //   sample_transmission    incident roughness random         outgoing normal incident_dot_normal pdf weight eta_scale
 //                                                            status
@@ -27,7 +26,8 @@ namespace facetwise {
 //   evaluate_scattering    incident roughness outgoing       value pdf branch_probability status
 //
 // "roughness" is alpha and, as far as given, mean_slope and slope_correlation. Operations also read what the
-// model's interface needs: f0, f90 (Schlick) or eta (dielectric).
+// model's interface needs: f0, f90 (Schlick) or eta (dielectric). Values and masking are no sampler's: evaluate_* read
+// Batch::sampler where the pdf is wanted, masking never.
 //
 // With a dielectric, *_reflection and *_transmission force the event: each microfacet reflects, or transmits,
 // whatever its Fresnel reflectance F, which is then part of weight and value alone. *_scattering choose between
@@ -39,12 +39,11 @@ enum class Operation : std::uint8_t {
   sample_reflection = 1,
   pdf_reflection = 2,
   evaluate_reflection = 3,
-  evaluate_and_pdf = 4,
-  masking = 5,
-  sample_transmission = 6,
-  evaluate_transmission = 7,
-  sample_scattering = 8,
-  evaluate_scattering = 9,
+  masking = 4,
+  sample_transmission = 5,
+  evaluate_transmission = 6,
+  sample_scattering = 7,
+  evaluate_scattering = 8,
 };
 
 std::string_view name(Operation);
@@ -131,6 +130,7 @@ struct InputField {
   Column<float>& (*column)(Batch&);
   unsigned operations;
   std::optional<float> otherwise;  // what a missing column means; nothing where it may not be missing
+  bool random;                     // u1, u2, u3, which a generator stands in for
 };
 struct OutputField {
   std::string_view name;  // "out.outgoing.x", "out.pdf", ...
@@ -138,8 +138,8 @@ struct OutputField {
   unsigned operations;
 };
 
-// The samplers that a model has for an operation, whatever columns are given; empty where the model itself makes no sense
-// or the operation draws nothing.
+// The samplers that a model has for an operation's draws or pdf, whatever columns are given; empty where the model itself
+// makes no sense, and for masking.
 std::vector<Sampler> samplers_for(Operation, const Model&);
 
 std::span<const InputField> input_fields();

@@ -34,11 +34,20 @@ inline absl::StatusOr<Statistics> pdf_reflection(const Batch& batch, const Execu
 inline absl::StatusOr<Statistics> evaluate_reflection(const Batch& batch, const Execution& execution = {}) {
   return run(Operation::evaluate_reflection, batch, execution);
 }
-inline absl::StatusOr<Statistics> evaluate_and_pdf(const Batch& batch, const Execution& execution = {}) {
-  return run(Operation::evaluate_and_pdf, batch, execution);
-}
 inline absl::StatusOr<Statistics> masking(const Batch& batch, const Execution& execution = {}) {
   return run(Operation::masking, batch, execution);
+}
+inline absl::StatusOr<Statistics> sample_transmission(const Batch& batch, const Execution& execution = {}) {
+  return run(Operation::sample_transmission, batch, execution);
+}
+inline absl::StatusOr<Statistics> evaluate_transmission(const Batch& batch, const Execution& execution = {}) {
+  return run(Operation::evaluate_transmission, batch, execution);
+}
+inline absl::StatusOr<Statistics> sample_scattering(const Batch& batch, const Execution& execution = {}) {
+  return run(Operation::sample_scattering, batch, execution);
+}
+inline absl::StatusOr<Statistics> evaluate_scattering(const Batch& batch, const Execution& execution = {}) {
+  return run(Operation::evaluate_scattering, batch, execution);
 }
 
 // Compaction of accepted lanes, stable in order: what a wavefront queue keeps after sampling.
@@ -72,8 +81,11 @@ class Engine {
   auto sample_reflection(const Batch& batch) { return run(Operation::sample_reflection, batch); }
   auto pdf_reflection(const Batch& batch) { return run(Operation::pdf_reflection, batch); }
   auto evaluate_reflection(const Batch& batch) { return run(Operation::evaluate_reflection, batch); }
-  auto evaluate_and_pdf(const Batch& batch) { return run(Operation::evaluate_and_pdf, batch); }
   auto masking(const Batch& batch) { return run(Operation::masking, batch); }
+  auto sample_transmission(const Batch& batch) { return run(Operation::sample_transmission, batch); }
+  auto evaluate_transmission(const Batch& batch) { return run(Operation::evaluate_transmission, batch); }
+  auto sample_scattering(const Batch& batch) { return run(Operation::sample_scattering, batch); }
+  auto evaluate_scattering(const Batch& batch) { return run(Operation::evaluate_scattering, batch); }
 };
 
 std::unique_ptr<Engine> local_engine(const Execution& execution = {});

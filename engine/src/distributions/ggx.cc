@@ -4,9 +4,10 @@
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
 
 #include "hwy/highway.h"
-#include "src/kernels/exact-inl.h"
+#include "src/kernels/ggx_exact-inl.h"
 #include "src/kernels/register-inl.h"
-#include "src/kernels/vcavity-inl.h"
+#include "src/kernels/smith-inl.h"
+#include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -21,14 +22,14 @@ constexpr DistributionKernels MakeGgx() {
                       .template Add<Cap>(Sampler::cap)
                       .template Add<Cap>(Sampler::visible)
                       .template Add<Bounded>(Sampler::bounded)
-                      .template Add<Exact>(Sampler::exact)
+                      .template Add<GgxExact>(Sampler::exact)
                       .kernels;
   kernels.smith_affine = Registrar<Surface<Ggx, Smith, true>, D, Pairs>()
                              .template Add<GgxNdf>(Sampler::ndf)
                              .template Add<Heitz, Cap>(Sampler::heitz)
                              .template Add<Cap>(Sampler::cap)
                              .template Add<Cap>(Sampler::visible)
-                             .template Add<Exact>(Sampler::exact)
+                             .template Add<GgxExact>(Sampler::exact)
                              .kernels;
   kernels.vcavity = Registrar<Surface<Ggx, VCavity, false>, D>()
                         .template Add<SlopeNdf>(Sampler::ndf)

@@ -6,7 +6,7 @@
 #include "hwy/highway.h"
 #include "src/kernels/register-inl.h"
 #include "src/kernels/phong-inl.h"
-#include "src/kernels/vcavity-inl.h"
+#include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {

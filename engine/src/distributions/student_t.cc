@@ -5,8 +5,9 @@
 
 #include "hwy/highway.h"
 #include "src/kernels/register-inl.h"
+#include "src/kernels/smith-inl.h"
 #include "src/kernels/student_t-inl.h"
-#include "src/kernels/vcavity-inl.h"
+#include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {

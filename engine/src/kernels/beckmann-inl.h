@@ -16,12 +16,9 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-struct Beckmann : SlopeDistribution<Beckmann> {
+struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
   static constexpr bool kShifts = true;
-  static constexpr float kLargestRoughness = kLargestAlpha;
   static constexpr bool kLongChains = true;
-  static constexpr bool kOwnMean = false;
-  static constexpr bool kHasShare = false;
   static constexpr bool kCavityBehind = true;
 
   // w_z / sqrt(A) and sqrt(A).
@@ -42,10 +39,10 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     V root, erfcx, tail;
     const V k = Cotangent(d, i.wz, i.a, root);
     ErfcxAndTail(d, Abs(k), erfcx, tail);
-    i.t = FrontArea(d, k, root, tail);
+    i.two_sigma = FrontArea(d, k, root, tail);
     i.shift = Zero(d);
     if (!i.all_front) {
-      i.t = Select(i.ahead, i.t, root * tail);
+      i.two_sigma = Select(i.ahead, i.two_sigma, root * tail);
       i.shift = IfThenElseZero(Not(i.ahead), k * k);
     }
   }
@@ -54,7 +51,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     V root, erfcx, tail;
     const V k = Cotangent(d, i.wz, i.a, root);
     ErfcxAndTail(d, Abs(k), erfcx, tail);
-    i.tn = FrontArea(d, k, root, tail);
+    i.two_normaliser = FrontArea(d, k, root, tail);
     i.shift = Zero(d);
   }
   // 2 sigma(-o) times e^(shift) of i: both may underflow, their quotient does not.
@@ -93,9 +90,9 @@ struct Beckmann : SlopeDistribution<Beckmann> {
 
   // Visible slopes by inversion: x along the azimuth, y independent of it.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void DrawVisible(D d, const I& i, V c, V s, V u1, V u2, V& x, V& y, V& gap) {
+  static HWY_INLINE void DrawVisible(D d, const I&, V c, V s, V u1, V u2, V& x, V& y, V& gap) {
     const V one = Set(d, 1.0f);
-    const V k = c / Max(s, Set(d, 1e-15f));
+    const V k = c / Max(s, Set(d, kVertical));
     V t;
     VisibleSlope(d, k, u1, x, t);
     gap = Select(k > one, Max(NegFma(s, x, c), Zero(d)), s * t);
@@ -186,8 +183,7 @@ struct Beckmann : SlopeDistribution<Beckmann> {
   // and k.
   template <class D, class I, class V = Vec<D>>
   static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
-    const V zero = Zero(d), one = Set(d, 1.0f), two = Set(d, 2.0f), half = Set(d, 0.5f);
-    const auto vertical = i.a < Set(d, kSmallestA);
+    const V one = Set(d, 1.0f), two = Set(d, 2.0f), half = Set(d, 0.5f);
     V root;
     const V k = Cotangent(d, Abs(i.z), i.a, root);
     const V k3 = Set(d, 3.0f) * k;
@@ -196,10 +192,10 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     ErfcxAndTail(d, k, erfcx, tail);
     const V fall = Exp(d, Set(d, -8.0f) * k * k);
     // 2 s / H, both times e^(k^2)
-    const V probability = Min(two * erfcx3 * fall / i.t, one);
+    const V probability = Min(two * erfcx3 * fall / i.two_sigma, one);
     const auto first = u3 < probability;
     const V share = Select(first, probability, one - probability);
-    u3 = Min(Select(first, u3, u3 - probability) / Max(share, Set(d, 0x1p-60f)), Set(d, 1.0f - 0x1p-24f));
+    u3 = Min(Select(first, u3, u3 - probability) / Max(share, Set(d, kTiny)), Set(d, kLargestBelowOne));
 
     // First: the share u1 s of all slopes. It may underflow: then x = -3 k - t with t almost exponential.
     const V s = half * erfcx3 * Gauss(d, k3);
@@ -212,15 +208,12 @@ struct Beckmann : SlopeDistribution<Beckmann> {
     const V at3 = fall * Fma(two * k, erfcx3, tail3) / tail;
     const V u = Fma(u1, one - at3, at3);
     V visible, gap;
-    VisibleSlope(d, Neg(k), Min(u, Set(d, 1.0f - 0x1p-24f)), visible, gap);
+    VisibleSlope(d, Neg(k), Min(u, Set(d, kLargestBelowOne)), visible, gap);
     gap = Min(gap, two * k);
     const V along = Select(first, first_x, Neg(k + gap));
     const V across = NormalSlope(d, u2, one - u2);
 
-    const V scale = one / root;
-    const V ex = Select(vertical, one, i.wx * scale), ey = Select(vertical, zero, i.wy * scale);
-    x = Fms(along, ex, across * ey);
-    y = Fma(along, ey, across * ex);
+    Azimuth<D>(d, i.wx, i.wy, root, i.a < Set(d, kSmallestA)).Turn(along, across, x, y);
     im = root * Select(first, Neg(along + k), gap);
   }
 

@@ -19,7 +19,7 @@ namespace HWY_NAMESPACE {
 template <class D>
 struct Ellipse {
   using V = Vec<D>;
-  Azimuth<D> azimuth;
+  Incidence<D> w;
   V k;             // cot of the stretched incidence
   V xa, xb;
   V m12, m22, kappa;
@@ -27,12 +27,12 @@ struct Ellipse {
   V area;          // i_z (C_b - C_a)
 
   template <class I>
-  HWY_INLINE Ellipse(D d, const I& i) : azimuth(d, i) {
+  HWY_INLINE Ellipse(D d, const I& i) : w(d, i) {
     const V one = Set(d, 1.0f), half = Set(d, 0.5f);
-    const V ex = azimuth.ex, ey = azimuth.ey;
+    const V ex = w.ex, ey = w.ey;
     const V ax2 = i.ax * i.ax, ay2 = i.ay * i.ay;
     // Lanes behind compute with i = n.
-    const V z = Select(i.front, Max(i.wz, Set(d, 0x1p-60f)), one);
+    const V z = Select(i.front, Max(i.wz, Set(d, kTiny)), one);
     const V slope = Min(Sqrt(i.a) / z, Set(d, 1e12f));  // T
     k = Min(one / Max(slope, Set(d, 1e-7f)), Set(d, 1e7f));
     m12 = (ay2 - ax2) * ex * ey;
@@ -114,12 +114,8 @@ struct NormalInterval {
   }
 };
 
-struct BeckmannExact {
+struct BeckmannExact : SamplerTraits {
   static constexpr bool kUnit = true;
-  static constexpr bool kUsesU3 = false;
-  static constexpr bool kVisible = true;
-  static constexpr bool kNIsSigma = false;
-  static constexpr bool kShifted = true;
   static constexpr bool kOwnShift = true;
   static constexpr bool kExact = true;
   static constexpr bool kNormals = false;
@@ -134,15 +130,15 @@ struct BeckmannExact {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V TwoN(D d, const I& i, V mx, V my, V mz, V, V& shift) {
     const Ellipse<D> ellipse(d, i);
-    const V inverse = Set(d, -1.0f) / Max(mz, Set(d, 0x1p-30f));
+    const V inverse = Set(d, -1.0f) / Max(mz, Set(d, kHorizon));
     const V sx = mx * inverse / i.ax, sy = my * inverse / i.ay;
-    const V x = Fma(sx, ellipse.azimuth.ex, sy * ellipse.azimuth.ey);
+    const V x = Fma(sx, ellipse.w.ex, sy * ellipse.w.ey);
     V from, to;
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);
     shift = i.all_front ? interval.shift : Select(i.front, interval.shift, i.shift);
     const V two_n = (ellipse.area + ellipse.area) * interval.share;
-    return i.all_front ? two_n : Select(i.front, two_n, i.tn);
+    return i.all_front ? two_n : Select(i.front, two_n, i.two_normaliser);
   }
 
   template <class D, class I, class V = Vec<D>>
@@ -150,27 +146,21 @@ struct BeckmannExact {
     const Ellipse<D> ellipse(d, i);
     V x, t, from, to;
     const V u = Fma(u1, ellipse.fb - ellipse.fa, ellipse.fa);
-    Beckmann::VisibleSlope(d, ellipse.k, Min(u, Set(d, 1.0f - 0x1p-24f)), x, t);
+    Beckmann::VisibleSlope(d, ellipse.k, Min(u, Set(d, kLargestBelowOne)), x, t);
     x = Min(Max(x, ellipse.xa), ellipse.xb);
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);
     const V y = interval.Draw(d, u2);
-    const Azimuth<D>& azimuth = ellipse.azimuth;
-    FromSlope(d, i, Fms(x, azimuth.ex, y * azimuth.ey), Fma(x, azimuth.ey, y * azimuth.ex), drawn);
-    drawn.im = Max(i.nu * NegFma(azimuth.s, x, azimuth.c), Set(d, kSmallestIm));
+    V sx, sy;
+    ellipse.w.Turn(x, y, sx, sy);
+    FromSlope(d, i, sx, sy, drawn);
+    drawn.im = Max(i.nu * NegFma(ellipse.w.s, x, ellipse.w.c), Set(d, kSmallestIm));
     drawn.two_n = Max((ellipse.area + ellipse.area) * interval.share, Set(d, 1e-37f));
     drawn.shift = interval.shift;
     if (!i.all_front) {
       Drawn<D> behind;
       SlopeVisible::Draw(d, i, u1, u2, u3, behind);
-      drawn.mx = Select(i.front, drawn.mx, behind.mx);
-      drawn.my = Select(i.front, drawn.my, behind.my);
-      drawn.mm = Select(i.front, drawn.mm, behind.mm);
-      drawn.im = Select(i.front, drawn.im, behind.im);
-      drawn.two_n = Select(i.front, drawn.two_n, behind.two_n);
-      drawn.sx = Select(i.front, drawn.sx, behind.sx);
-      drawn.sy = Select(i.front, drawn.sy, behind.sy);
-      drawn.shift = IfThenElseZero(i.front, drawn.shift);
+      drawn.KeepWhere(i.front, behind);
     }
   }
 };

@@ -7,30 +7,26 @@
 #define FACETWISE_GGX_INL_H_
 #endif
 
-#include "src/kernels/surface-inl.h"
-#include "src/math/sincos-inl.h"
+#include "src/kernels/ggx_cone-inl.h"
+#include "src/kernels/sampler-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-struct Ggx {
-  static constexpr bool kShifts = false;
-  static constexpr bool kLongChains = false;
-  static constexpr bool kOwnMean = false;
-  static constexpr bool kHasShare = true;
+struct Ggx : DistributionTraits {
+  static constexpr bool kHasShareUnoccluded = true;
   static constexpr bool kCavityBehind = true;
-  static constexpr float kLargestRoughness = kLargestAlpha;
 
   template <class D, class I>
   static HWY_INLINE void Area(D d, I& i) {
-    i.t = i.nu + i.wz;
+    i.two_sigma = i.nu + i.wz;
     // Behind the surface w_z + nu cancels: A / (nu - w_z).
-    if (!i.all_front) i.t = Select(i.ahead, i.t, Max(i.a, Set(d, kSmallestA)) / (i.nu - i.wz));
+    if (!i.all_front) i.two_sigma = Select(i.ahead, i.two_sigma, Max(i.a, Set(d, kSmallestA)) / (i.nu - i.wz));
   }
   template <class D, class I>
   static HWY_INLINE void BiasedArea(D, I& i) {
-    i.tn = i.nu + Abs(i.wz);
+    i.two_normaliser = i.nu + Abs(i.wz);
   }
 
   // For a direction o in front of the surface, its z' and A: 2 sigma(o), and 2 sigma(-o) as back / scale.
@@ -89,35 +85,26 @@ struct Ggx {
     two_hit = (two_a / (r1 + k) + two_a / (r3 + k3)) / (r1 + r3);
   }
   // Tokuyoshi 2021, listings 1 to 3, for c < 0. With a share 2 s / H the normal, drawn in proportion to m_hat_z, faces the
-  // direction with 3 c instead of c; else it is a visible one that does not. Both as in `heitz` (samplers-inl.h) with
+  // direction with 3 c instead of c; else it is a visible one that does not. Both as in `heitz` (ggx_samplers-inl.h) with
   // another s; the second ends at L = -(1 + 2 c^2) / r, r^2 = 1 + 8 c^2.
   template <class D, class I, class V = Vec<D>>
   static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
-    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), two = Set(d, 2.0f), three = Set(d, 3.0f);
+    const V one = Set(d, 1.0f), half = Set(d, 0.5f), two = Set(d, 2.0f), three = Set(d, 3.0f);
     const V a = Max(i.a, Set(d, kSmallestA));
-    const auto vertical = i.a < Set(d, kSmallestA);
     const V horizontal = Sqrt(a), nu = Sqrt(Fma(i.z, i.z, a));
-    const V scale = one / horizontal;
-    const V ex = Select(vertical, one, i.wx * scale), ey = Select(vertical, zero, i.wy * scale);
+    const Azimuth<D> azimuth(d, i.wx, i.wy, horizontal, i.a < Set(d, kSmallestA));
     const V k = Abs(i.z) / nu, s = horizontal / nu;  // -c and the sine
     const V k2 = k * k, s2 = s * s;
     const V r = Sqrt(Fma(Set(d, 8.0f), k2, one));
     const V facing = half * s2 / (r * Fma(three, k, r));
     const V other = two * k2 * s2 / (r * (Fma(two, k2, one) + r));
-    const V probability = Min(Set(d, 4.0f) * facing / i.t, one);
+    const V probability = Min(Set(d, 4.0f) * facing / i.two_sigma, one);
     const auto first = u3 < probability;
     const V share = Select(first, probability, one - probability);
-    u3 = Min(Select(first, u3, u3 - probability) / Max(share, Set(d, 0x1p-60f)), Set(d, 1.0f - 0x1p-24f));
+    u3 = Min(Select(first, u3, u3 - probability) / Max(share, Set(d, kTiny)), Set(d, kLargestBelowOne));
 
-    V sin, cos;
-    SinCosTurn(d, u2, sin, cos);
-    const V radius = Sqrt(u1);
-    const V t1 = radius * cos, radial = radius * sin;
-    const V rest = one - u1;
-    const V big_r = Sqrt(Max((one - t1) * (one + t1), rest));
-    const V larger = big_r + Abs(radial), smaller = rest / larger;
-    const auto upper = radial > zero;
-    const V b = Select(upper, smaller, larger), p = Select(upper, larger, smaller);  // R - r sin, R + r sin
+    const DiscChord<D> disc(d, u1, u2);
+    const V big_r = disc.big_r, b = disc.b, p = disc.p;
     const V part = Select(first, facing, other);
     const V t2 = NegFma(part, b, big_r);
     const V up = Sqrt(part * b * Fma(one - part, b, p));  // sqrt(R^2 - t2^2)
@@ -127,19 +114,17 @@ struct Ggx {
     const V gap = s2 * (one / (one + k) - Set(d, 4.0f) * k2 / (r * (Fma(two, k2, one) + r)));
     const V second_z = Fma(big_r, gap, part * p) * Fma(big_r, k, t2) / Fma(t2, s, up * k);
     const V along = Select(first, t2, Fma(t2, k, up * s));
-    const V z = Max(Select(first, up, second_z), Set(d, 0x1p-30f));
+    const V z = Max(Select(first, up, second_z), Set(d, kHorizon));
     const V inverse = Neg(one / z);
-    const V slope = along * inverse, across = t1 * inverse;
-    x = Fms(slope, ex, across * ey);
-    y = Fma(slope, ey, across * ex);
+    azimuth.Turn(along * inverse, disc.t1 * inverse, x, y);
     // By the slope itself, so that o is its reflection.
     im = NegFma(i.wx, x, NegFma(i.wy, y, i.wz));
   }
 
   // K / sigma(i).
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V Share(D d, const I& i) {
-    return ConeShare(d, i);  // exact-inl.h
+  static HWY_INLINE V ShareUnoccluded(D d, const I& i) {
+    return ShareInCone(d, i);
   }
 };
 

@@ -15,12 +15,9 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-struct Phong : SlopeDistribution<Phong> {
-  static constexpr bool kShifts = false;
+struct Phong : SlopeDistribution<Phong>, DistributionTraits {
   static constexpr float kLargestRoughness = kLargestPhongAlpha;
   static constexpr bool kLongChains = true;
-  static constexpr bool kOwnMean = false;
-  static constexpr bool kCavityBehind = false;
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V Profile(D d, const I& i, V x, V y, V) {

@@ -7,7 +7,8 @@
 #define FACETWISE_REGISTER_INL_H_
 #endif
 
-#include "src/kernels/operations-inl.h"
+#include "src/kernels/query-inl.h"
+#include "src/kernels/sample-inl.h"
 #include "src/kernels/scatter-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -11,7 +11,9 @@
 #define FACETWISE_SCATTER_INL_H_
 #endif
 
-#include "src/kernels/operations-inl.h"
+#include "src/kernels/inputs-inl.h"
+#include "src/kernels/output-inl.h"
+#include "src/kernels/sampler-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -37,10 +39,10 @@ HWY_INLINE Mask<D> Unbent(D d, const Tile& tile, std::size_t lane) {
 }
 
 // sample_scattering and sample_transmission.
-template <class D, class S, class Sampler>
+template <class D, class S, class Drawer>
 struct Scatter {
   using V = Vec<D>;
-  SampleInputs<D, S, Sampler::kUsesU3> in;
+  SampleInputs<D, S, Drawer::kUsesU3> in;
   V u3;
 
   HWY_INLINE Scatter(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane), u3(in.u3) {
@@ -52,33 +54,33 @@ struct Scatter {
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
-    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, 3e38f);
+    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, kLargestDensity);
     const V loaded_eta = LoadU(d, tile.in[kEta] + lane);
-    Policy<D> policy;
+    LaneClasses<D> classes;
     if constexpr (!kFast) {
-      policy = in.Classified(d, tile, lane);
-      policy.valid = And(policy.valid, InUnitInterval(d, u3));
-      policy.smooth = And(policy.valid, Or(policy.smooth, Unbent(d, tile, lane)));
+      classes = in.Classified(d, tile, lane);
+      classes.valid = And(classes.valid, InUnitInterval(d, u3));
+      classes.smooth = And(classes.valid, Or(classes.smooth, Unbent(d, tile, lane)));
     }
-    const Exceptions<D, kFast> exceptions(d, policy);
+    const Exceptions<D, kFast> exceptions(d, classes);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
-    const V eta = exceptions.Harmless(loaded_eta, 1.5f), inverse_eta = one / eta;
+    const V eta = exceptions.Computable(loaded_eta, 1.5f), inverse_eta = one / eta;
 
     Drawn<D> drawn;
-    V choice = exceptions.Harmless(u3, 0.0f);
-    Sampler::Draw(d, i, exceptions.Harmless(in.u1, 0.0f), exceptions.Harmless(in.u2, 0.0f), choice, drawn);
+    V choice = exceptions.Computable(u3, 0.0f);
+    Drawer::Draw(d, i, exceptions.Computable(in.u1, 0.0f), exceptions.Computable(in.u2, 0.0f), choice, drawn);
     if (tile.transmits) choice = zero;
 
     const V inverse_length = one / Sqrt(drawn.mm);
     const V mx = drawn.mx * inverse_length, my = drawn.my * inverse_length, mz = drawn.mz * inverse_length;
     const V c = Min(Max(drawn.im, Set(d, kSmallestIm)) * inverse_length, one);
-    auto seen = drawn.im > (Sampler::kVisible ? zero : Set(d, kSmallestIm));
-    if constexpr (Sampler::kVisible) seen = Not(NoLanes(d));
-    if (!i.all_front) seen = AndNot(S::Masking::Blind(d, i), seen);
+    auto seen = drawn.im > (Drawer::kVisible ? zero : Set(d, kSmallestIm));
+    if constexpr (Drawer::kVisible) seen = Not(NoLanes(d));
+    if (!i.all_front) seen = AndNot(S::Masking::SeesNothing(d, i), seen);
 
     // Both events.
     V rho = (drawn.im + drawn.im) / drawn.mm;
-    if constexpr (!Sampler::kUnit) rho = Max(rho, Set(d, kSmallestRho<S>));
+    if constexpr (!Drawer::kUnit) rho = Max(rho, Set(d, kSmallestRho<S>));
     V rx = Fms(rho, drawn.mx, i.x), ry = Fms(rho, drawn.my, i.y);
     const V rz = Fms(rho, drawn.mz, i.z);
     const Refraction<D> refraction(d, c, eta);
@@ -109,7 +111,7 @@ struct Scatter {
     V pdf = zero;
     if (tile.wanted & kWantsPdf) {
       V numerator, denominator;
-      Sampler::Density(d, i, drawn, rho, numerator, denominator);
+      Drawer::Density(d, i, drawn, rho, numerator, denominator);
       denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
       const V jacobian = Select(reflects, one, four * c * eta * (refraction.g / (refraction.bend * refraction.bend)));
       pdf = IfThenElseZero(accepted, Min(Min(numerator / denominator, largest) * jacobian * branch, largest));
@@ -119,11 +121,11 @@ struct Scatter {
     const V radiance = tile.importance ? one : inverse_eta * inverse_eta;
     const Mirror mirror(d, in, tile, loaded_eta, u3);
     if (tile.wanted & kWantsWeight) {
-      const V reflected_weight = S::Masking::template Weight<Sampler>(d, i, drawn, rx, ry, rz, tile.uncorrelated);
+      const V reflected_weight = S::Masking::template Weight<Drawer>(d, i, drawn, rx, ry, rz, tile.uncorrelated);
       V transmitted_weight = S::Masking::TransmissionMasking(d, i, mz, c, refraction.g * inverse_eta, tx, ty, tz);
-      if constexpr (!Sampler::kNIsSigma) {
+      if constexpr (!Drawer::kNIsSigma) {
         V numerator = drawn.two_n;
-        if constexpr (S::Distribution::kShifts && !Sampler::kShifted)
+        if constexpr (S::Distribution::kShifts && !Drawer::kShifted)
           if (!i.all_front) numerator = numerator * Exp(d, i.shift);
         transmitted_weight = transmitted_weight * (numerator / S::Masking::VisibleTwoN(d, i, mz, c));
       }
@@ -194,7 +196,7 @@ struct Scatter {
 };
 
 // evaluate_scattering and evaluate_transmission.
-template <class D, class S, class Sampler>
+template <class D, class S, class Drawer>
 struct ScatterQuery {
   using V = Vec<D>;
   using Distribution = typename S::Distribution;
@@ -207,18 +209,18 @@ struct ScatterQuery {
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
-    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, 3e38f);
+    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, kLargestDensity);
     const V loaded_eta = LoadU(d, tile.in[kEta] + lane);
-    Policy<D> policy;
+    LaneClasses<D> classes;
     if constexpr (!kFast) {
-      policy = in.Classified(d, tile, lane);
-      policy.smooth = And(policy.valid, Or(policy.smooth, Unbent(d, tile, lane)));
+      classes = in.Classified(d, tile, lane);
+      classes.smooth = And(classes.valid, Or(classes.smooth, Unbent(d, tile, lane)));
     }
-    const Exceptions<D, kFast> exceptions(d, policy);
+    const Exceptions<D, kFast> exceptions(d, classes);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
-    const V eta = exceptions.Harmless(loaded_eta, 1.5f), inverse_eta = one / eta;
-    V x = exceptions.Harmless(in.ox, 0.0f), y = exceptions.Harmless(in.oy, 0.0f);
-    const V z = exceptions.Harmless(in.oz, 1.0f);
+    const V eta = exceptions.Computable(loaded_eta, 1.5f), inverse_eta = one / eta;
+    V x = exceptions.Computable(in.ox, 0.0f), y = exceptions.Computable(in.oy, 0.0f);
+    const V z = exceptions.Computable(in.oz, 1.0f);
     const auto reflects = z > zero;
     if (tile.retro) {
       const V sign = IfThenElseZero(reflects, SignBit(d));
@@ -240,7 +242,7 @@ struct ScatterQuery {
     auto reached = Select2(reflects, And(straight, h2 > Set(d, 0x1p-40f)),
                            And(And(And(z < zero, hz > zero), And(dot_i > zero, dot_o < zero)), h2 > Set(d, 1e-30f)));
     if (tile.transmits) reached = And(reached, Not(reflects));
-    if (!i.all_front) reached = AndNot(S::Masking::Blind(d, i), reached);
+    if (!i.all_front) reached = AndNot(S::Masking::SeesNothing(d, i), reached);
 
     const V length2 = Select(reached, h2, one);
     const V inverse_length = one / Sqrt(length2);
@@ -268,9 +270,9 @@ struct ScatterQuery {
     const V jacobian = Select(reflects, one, four * c * (eta * eta) * om / length2);
 
     if (tile.wanted & kWantsPdf) {
-      const V two_n = Sampler::TwoN(d, i, mx, my, mz, c);
+      const V two_n = Drawer::TwoN(d, i, mx, my, mz, c);
       V numerator = density;
-      if constexpr (Distribution::kShifts && !Sampler::kShifted)
+      if constexpr (Distribution::kShifts && !Drawer::kShifted)
         if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, one, zero));
       const V pdf = Min(Min(numerator / (denominator * two_n), largest) * jacobian * branch, largest);
       Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
@@ -290,7 +292,7 @@ struct ScatterQuery {
     // A reflection that no microfacet makes is no occluded one, as in pdf_reflection.
     auto answered = Or(reflects, reached);
     if (tile.transmits) answered = reached;
-    if (!i.all_front) answered = AndNot(S::Masking::Blind(d, i), answered);
+    if (!i.all_front) answered = AndNot(S::Masking::SeesNothing(d, i), answered);
     exceptions.Finish(tile, lane, Not(answered), statistics);
   }
 

@@ -7,7 +7,7 @@
 #define FACETWISE_SLOPES_INL_H_
 #endif
 
-#include "src/kernels/samplers-inl.h"
+#include "src/kernels/sampler-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -20,7 +20,7 @@ struct SlopeDistribution {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V Density(D d, const I& i, V mx, V my, V mz, V m2, V shift) {
     Centre(i, mx, my, mz);
-    const V inverse = Set(d, 1.0f) / Max(mz, Set(d, 0x1p-30f));
+    const V inverse = Set(d, 1.0f) / Max(mz, Set(d, kHorizon));
     const V q = m2 * (inverse * inverse);
     return Policy::Profile(d, i, Neg(mx * inverse) / i.ax, Neg(my * inverse) / i.ay, shift) * q * q;
   }
@@ -53,13 +53,9 @@ struct SlopeNormals {
 };
 
 // Normals with density D(m) m_z, by DrawSlope(d, i, u1, u2, x, y).
-struct SlopeNdf : SlopeNormals {
-  static constexpr bool kUsesU3 = false;
+struct SlopeNdf : SamplerTraits, SlopeNormals {
   static constexpr bool kVisible = false;
-  static constexpr bool kNIsSigma = false;
   static constexpr bool kShifted = false;
-  static constexpr bool kExact = false;
-  static constexpr bool kNormals = true;
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Density(D d, const I& i, const Drawn<D>& drawn, V, V& numerator, V& denominator) {
@@ -80,36 +76,18 @@ struct SlopeNdf : SlopeNormals {
   }
 };
 
-// Where w points in the plane: its direction (1, 0) if it is vertical, cosine c and sine s of its angle with n.
-template <class D>
-struct Azimuth {
-  using V = Vec<D>;
-  V ex, ey, c, s;
-  template <class I>
-  HWY_INLINE Azimuth(D d, const I& i) {
-    const V one = Set(d, 1.0f);
-    const V horizontal = Sqrt(i.a);
-    const auto vertical = horizontal < Set(d, 1e-15f);
-    const V scale = one / Select(vertical, one, horizontal);
-    ex = Select(vertical, one, i.wx * scale);
-    ey = Select(vertical, Zero(d), i.wy * scale);
-    const V inverse_nu = one / i.nu;
-    c = i.wz * inverse_nu;
-    s = horizontal * inverse_nu;
-  }
-};
-
 // Visible normals by the distribution's DrawVisible(d, i, c, s, u1, u2, x, y, gap), with x along the azimuth and
 // gap = c - s x.
 struct SlopeVisible : SlopeNormals, VisibleNormals {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
-    const Azimuth<D> azimuth(d, i);
-    V x, y, gap;
-    I::Distribution::DrawVisible(d, i, azimuth.c, azimuth.s, u1, u2, x, y, gap);
-    FromSlope(d, i, Fms(x, azimuth.ex, y * azimuth.ey), Fma(x, azimuth.ey, y * azimuth.ex), drawn);
+    const Incidence<D> w(d, i);
+    V along, across, gap, x, y;
+    I::Distribution::DrawVisible(d, i, w.c, w.s, u1, u2, along, across, gap);
+    w.Turn(along, across, x, y);
+    FromSlope(d, i, x, y, drawn);
     drawn.im = Max(i.nu * gap, Set(d, kSmallestIm));
-    drawn.two_n = i.tn;
+    drawn.two_n = i.two_normaliser;
   }
 };
 

@@ -13,9 +13,6 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class Sampler>
-inline constexpr bool HasOwnShift = requires { Sampler::kOwnShift; };
-
 struct Smith {
   static constexpr bool kUnboundedW = false;  // of Value()
 
@@ -28,7 +25,7 @@ struct Smith {
     I::Distribution::BiasedArea(d, i);
   }
   template <class D, class I>
-  static HWY_INLINE Mask<D> Blind(D d, const I&) {
+  static HWY_INLINE Mask<D> SeesNothing(D d, const I&) {
     return NoLanes(d);
   }
 
@@ -45,14 +42,14 @@ struct Smith {
     const V wx = i.ax * ox, wy = i.ay * oy;
     const V a = Fma(wx, wx, wy * wy);
     if constexpr (I::Surface::kAffine) oz = NegFma(i.mean_x, ox, NegFma(i.mean_y, oy, oz));
-    const V z = Max(oz, Set(d, 0x1p-60f));
+    const V z = Max(oz, Set(d, kTiny));
     V front, back, scale;
     Distribution::Areas(d, i, wx, wy, z, a, front, back, scale);
     if (uncorrelated) {
       numerator = z + z;
       denominator = front;
     } else {
-      numerator = i.tn * (z * scale);
+      numerator = i.two_normaliser * (z * scale);
       denominator = Fma(Abs(i.wz), back, numerator);
     }
     if constexpr (I::Surface::kAffine) numerator = IfThenElseZero(oz > Zero(d), numerator);
@@ -63,21 +60,21 @@ struct Smith {
   static HWY_INLINE void Value(D d, const I& i, V, V, V ox, V oy, V oz, bool uncorrelated, V& two_n, V& w) {
     V lit, all;
     Shadowing(d, i, ox, oy, oz, uncorrelated, lit, all);
-    two_n = i.tn;
+    two_n = i.two_normaliser;
     w = lit / all;
   }
 
   // The weight of a sample: f cos(theta_o) is w D / (4 sigma), so it is w N / sigma.
-  template <class Sampler, class D, class I, class Drawn, class V = Vec<D>>
+  template <class Drawer, class D, class I, class Drawn, class V = Vec<D>>
   static HWY_INLINE V Weight(D d, const I& i, const Drawn& drawn, V ox, V oy, V oz, bool uncorrelated) {
     V lit, all;
     Shadowing(d, i, ox, oy, oz, uncorrelated, lit, all);
-    if constexpr (HasOwnShift<Sampler>) {
-      lit = lit * (drawn.two_n / i.tn) * Exp(d, Neg(drawn.shift));
-    } else if constexpr (!Sampler::kNIsSigma) {
+    if constexpr (Drawer::kOwnShift) {
+      lit = lit * (drawn.two_n / i.two_normaliser) * Exp(d, Neg(drawn.shift));
+    } else if constexpr (!Drawer::kNIsSigma) {
       lit = lit * drawn.two_n;
-      all = all * i.tn;
-      if constexpr (I::Distribution::kShifts && !Sampler::kShifted)
+      all = all * i.two_normaliser;
+      if constexpr (I::Distribution::kShifts && !Drawer::kShifted)
         if (!i.all_front) lit = lit * Exp(d, i.shift);
     }
     return lit / all;
@@ -86,7 +83,7 @@ struct Smith {
   // 2 N of visible normals.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V VisibleTwoN(D, const I& i, V, V) {
-    return i.tn;
+    return i.two_normaliser;
   }
 
   // What a direction o below the surface sees of the microfacets that transmit to it: G1 of -o.
@@ -99,16 +96,16 @@ struct Smith {
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void MaskingAndArea(D d, const I& i, V& masking, V& area) {
-    masking = IfThenElseZero(i.ahead, Min((i.wz + i.wz) / i.t, Set(d, 1.0f)));
-    area = i.t * Set(d, 0.5f);
+    masking = IfThenElseZero(i.ahead, Min((i.wz + i.wz) / i.two_sigma, Set(d, 1.0f)));
+    area = i.two_sigma * Set(d, 0.5f);
     if constexpr (I::Distribution::kShifts)
       if (!i.all_front) area = area * Exp(d, Neg(i.shift));
   }
 
   // Share of the visible normals whose reflection is not occluded.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V Share(D d, const I& i) {
-    if constexpr (I::Distribution::kHasShare) return I::Distribution::Share(d, i);
+  static HWY_INLINE V ShareUnoccluded(D d, const I& i) {
+    if constexpr (I::Distribution::kHasShareUnoccluded) return I::Distribution::ShareUnoccluded(d, i);
     return Zero(d);
   }
 };

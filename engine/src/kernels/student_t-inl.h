@@ -16,13 +16,8 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-struct StudentT : SlopeDistribution<StudentT> {
-  static constexpr bool kShifts = false;
+struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   static constexpr bool kLongChains = true;
-  static constexpr bool kOwnMean = false;
-  static constexpr bool kHasShare = false;
-  static constexpr bool kCavityBehind = false;
-  static constexpr float kLargestRoughness = kLargestAlpha;
 
   // nu + z, and nu itself, for w stretched by sqrt(2) more; behind by its conjugate.
   template <class D, class V = Vec<D>>
@@ -36,13 +31,13 @@ struct StudentT : SlopeDistribution<StudentT> {
   static HWY_INLINE void Area(D d, I& i) {
     V nu;
     const V sum = Sum(d, i.wz, i.a, nu);
-    i.t = sum * sum / (nu + nu);
+    i.two_sigma = sum * sum / (nu + nu);
   }
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void BiasedArea(D d, I& i) {
     V nu;
     const V sum = Sum(d, Abs(i.wz), i.a, nu);
-    i.tn = sum * sum / (nu + nu);
+    i.two_normaliser = sum * sum / (nu + nu);
   }
   // nu - z is 2 A / (nu + z).
   template <class D, class I, class V = Vec<D>>
@@ -121,7 +116,7 @@ struct StudentT : SlopeDistribution<StudentT> {
       const V ratio = f / f1;
       const V bend = one / z - half / gone + half * t2 / linear - Set(d, 4.0f) * t2 * z * inverse_b;
       const V next = z - ratio / Max(NegFma(ratio, bend, one), Set(d, 0.25f));
-      z = Min(Max(next, z * Set(d, 0.25f)), Set(d, 1.0f - 0x1p-24f));
+      z = Min(Max(next, z * Set(d, 0.25f)), Set(d, kLargestBelowOne));
     }
     const V t = t_max * z;
     const V scaled = half * (t - one / t);

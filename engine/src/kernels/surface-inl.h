@@ -26,10 +26,25 @@ namespace HWY_NAMESPACE {
 
 inline constexpr float kPi = 3.14159265358979f;
 inline constexpr float kLengthTolerance = 1e-3f;  // of |v|^2 of a direction
+inline constexpr float kLargestDensity = 3e38f;   // one can be beyond the floats straight below a smooth surface
+inline constexpr float kLargestBelowOne = 1 - 0x1p-24f;
+inline constexpr float kTiny = 0x1p-60f;          // stands for a cosine or a share of 0 in quotients
+inline constexpr float kHorizon = 0x1p-30f;       // stands for a cosine of 0 where it is squared
+inline constexpr float kVertical = 1e-15f;        // a shorter (x, y) has no azimuth
 
 // Where w is straight below no normal is visible and sigma is 0. Behind the surface A is taken as this at least,
 // as if w were tilted by 3e-8, so that densities stay finite.
 inline constexpr float kSmallestA = 0x1p-50f;
+
+// What a distribution is unless it says otherwise.
+struct DistributionTraits {
+  static constexpr float kLargestRoughness = kLargestAlpha;
+  static constexpr bool kShifts = false;        // densities and areas are kept times e^(shift)
+  static constexpr bool kLongChains = false;    // sampling gains from pairs of vectors
+  static constexpr bool kOwnMean = false;       // the table's mean slope is added to the batch's
+  static constexpr bool kHasShareUnoccluded = false;      // ShareUnoccluded() is known
+  static constexpr bool kCavityBehind = false;  // V-cavity has samplers for i_z <= 0
+};
 
 // Distribution: a policy as described in docs/adding-a-distribution.md.
 template <class Distribution_, class Masking_, bool kAffine_>
@@ -52,8 +67,8 @@ struct Incident {
   V wx, wy, wz;
   V a;      // A
   V nu;     // length of w
-  V t;      // 2 sigma(i), times exp(shift)
-  V tn;     // the same as densities are normalised: Normalisation
+  V two_sigma;       // 2 sigma(i), times exp(shift)
+  V two_normaliser;  // the same as densities are normalised: Normalisation
   V shift;  // of distributions whose sigma underflows: density and area are both kept times exp(shift)
   Mask<D> front;  // i_z > 0
   Mask<D> ahead;  // w_z > 0
@@ -89,7 +104,7 @@ HWY_INLINE Incident<D, S> Prepare(D d, const Tile& tile, V x, V y, V z, V ax, V 
   }
   i.table = tile.table;
   S::Masking::Area(d, i);
-  i.tn = i.t;
+  i.two_normaliser = i.two_sigma;
   if (!i.all_front && tile.biased) S::Masking::BiasedArea(d, i);
   return i;
 }

@@ -9,7 +9,7 @@
 #define FACETWISE_VCAVITY_INL_H_
 #endif
 
-#include "src/kernels/slopes-inl.h"
+#include "src/kernels/surface-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -22,48 +22,48 @@ struct VCavity {
   static HWY_INLINE void Area(D d, I& i) {
     const auto two = Set(d, 2.0f);
     i.shift = Zero(d);
-    i.t = two;
+    i.two_sigma = two;
     if constexpr (I::Distribution::kCavityBehind)
       if (!i.all_front) {
         auto hit = two;
         I::Distribution::TwoHit(d, i, hit, i.shift);
-        i.t = Select(i.front, two, hit);
+        i.two_sigma = Select(i.front, two, hit);
       }
   }
   // All counted as hit.
   template <class D, class I>
   static HWY_INLINE void BiasedArea(D d, I& i) {
-    i.tn = Set(d, 2.0f);
+    i.two_normaliser = Set(d, 2.0f);
     i.shift = Zero(d);
   }
   // Lanes that see nothing: behind, where the distribution has no H.
   template <class D, class I>
-  static HWY_INLINE Mask<D> Blind(D d, const I& i) {
+  static HWY_INLINE Mask<D> SeesNothing(D d, const I& i) {
     return I::Distribution::kCavityBehind ? NoLanes(d) : Not(i.front);
   }
 
   // f cos(theta_o) = D min(G(i, m), G(o, m)) / (4 H |i_z|), with |i_z| divided out, as D w / (2 two_n).
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Value(D d, const I& i, V mz, V im, V, V, V oz, bool, V& two_n, V& w) {
-    const V iz = Max(Abs(i.z), Set(d, 0x1p-60f));
+    const V iz = Max(Abs(i.z), Set(d, kTiny));
     const V r = (mz + mz) / im;
     w = Min(r * Min(iz, oz), Set(d, 1.0f)) / iz;
     if constexpr (!I::Distribution::kCavityBehind) w = IfThenElseZero(i.front, w);
-    two_n = i.tn;
+    two_n = i.two_normaliser;
   }
 
-  template <class Sampler, class D, class I, class Drawn, class V = Vec<D>>
+  template <class Drawer, class D, class I, class Drawn, class V = Vec<D>>
   static HWY_INLINE V Weight(D d, const I& i, const Drawn& drawn, V ox, V oy, V oz, bool uncorrelated) {
-    if constexpr (Sampler::kNIsSigma) {
+    if constexpr (Drawer::kNIsSigma) {
       // min(G(i, m), G(o, m)) / G(i, m)
-      const V one = Set(d, 1.0f), iz = Max(Abs(i.z), Set(d, 0x1p-60f));
+      const V one = Set(d, 1.0f), iz = Max(Abs(i.z), Set(d, kTiny));
       const V r = (drawn.mz + drawn.mz) / drawn.im;
       return Min(r * Min(iz, oz), one) / Min(r * iz, one);
     } else {
       V two_n, w;
       Value(d, i, drawn.mz, drawn.im, ox, oy, oz, uncorrelated, two_n, w);
       w = w * drawn.two_n;
-      if constexpr (I::Distribution::kShifts && !Sampler::kShifted)
+      if constexpr (I::Distribution::kShifts && !Drawer::kShifted)
         if (!i.all_front) w = w * Exp(d, i.shift);
       return w / two_n;
     }
@@ -72,16 +72,16 @@ struct VCavity {
   // 2 N of visible normals.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V VisibleTwoN(D d, const I& i, V mz, V im) {
-    const V iz = Max(Abs(i.z), Set(d, 0x1p-60f));
+    const V iz = Max(Abs(i.z), Set(d, kTiny));
     const V n = Max(im / (mz + mz), iz);
-    if constexpr (I::Distribution::kCavityBehind) return i.tn * n;
-    return Select(i.front, i.tn * n, Set(d, 3e38f));
+    if constexpr (I::Distribution::kCavityBehind) return i.two_normaliser * n;
+    return Select(i.front, i.two_normaliser * n, Set(d, kLargestDensity));
   }
 
   // The same microfacet seen from both sides is masked alike: G(o, m) / G(i, m) beyond G(i, m).
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V TransmissionMasking(D d, const I& i, V mz, V im, V om, V, V, V oz) {
-    const V one = Set(d, 1.0f), iz = Max(Abs(i.z), Set(d, 0x1p-60f));
+    const V one = Set(d, 1.0f), iz = Max(Abs(i.z), Set(d, kTiny));
     const V two_mz = mz + mz;
     const V gi = Min(two_mz * iz / im, one), go = Min(two_mz * Abs(oz) / om, one);
     return Min(gi, go) / gi;
@@ -91,139 +91,14 @@ struct VCavity {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void MaskingAndArea(D d, const I& i, V& masking, V& area) {
     masking = Zero(d);
-    area = i.t * (Abs(i.z) * Set(d, 0.5f));
+    area = i.two_sigma * (Abs(i.z) * Set(d, 0.5f));
     if constexpr (I::Distribution::kShifts)
       if (!i.all_front) area = area * Exp(d, Neg(i.shift));
-    area = IfThenElseZero(Not(Blind(d, i)), area);
+    area = IfThenElseZero(Not(SeesNothing(d, i)), area);
   }
   template <class D, class I>
-  static HWY_INLINE Vec<D> Share(D d, const I&) {
+  static HWY_INLINE Vec<D> ShareUnoccluded(D d, const I&) {
     return Zero(d);
-  }
-};
-
-// Visible normals: one of a normal and its mirror image, by how much they face i (Heitz & d'Eon 2014, section 3); behind,
-// the distribution's DrawBehindCavity (Tokuyoshi 2021, section 2.3).
-struct CavityVisible : SlopeNormals, VisibleNormals {
-  static constexpr bool kUsesU3 = true;
-
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D d, const I& i, V, V, V mz, V im) {
-    return VCavity::VisibleTwoN(d, i, mz, im);
-  }
-
-  // u3 becomes what the choice leaves of it.
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V& u3, Drawn<D>& drawn) {
-    const V zero = Zero(d), below_one = Set(d, 1.0f - 0x1p-24f);
-    V x, y;
-    I::Distribution::DrawSlope(d, i, u1, u2, x, y);
-    const V across = Fma(i.wx, x, i.wy * y);
-    const V a1 = Max(i.wz - across, zero), a2 = Max(i.wz + across, zero);
-    const V at = u3 * (a1 + a2);
-    const auto mirrored = And(at >= a1, a2 > zero);
-    const V sign = IfThenElseZero(mirrored, SignBit(d));
-    V im = Select(mirrored, a2, a1);
-    const V left = Min(Max(Select(mirrored, at - a1, at) / Max(im, Set(d, kSmallestIm)), zero), below_one);
-    x = Xor(x, sign);
-    y = Xor(y, sign);
-    if constexpr (I::Distribution::kCavityBehind)
-      if (!i.all_front) {
-        V bx, by, bim, bu3 = u3;
-        I::Distribution::DrawBehindCavity(d, i, u1, u2, bu3, bx, by, bim);
-        x = Select(i.front, x, bx);
-        y = Select(i.front, y, by);
-        im = Select(i.front, im, bim);
-        u3 = Select(i.front, left, bu3);
-      } else {
-        u3 = left;
-      }
-    else
-      u3 = left;
-    FromSlope(d, i, x, y, drawn);
-    drawn.im = Max(im, Set(d, kSmallestIm));
-    drawn.two_n = TwoN(d, i, drawn.mx, drawn.my, drawn.mz, drawn.im);
-  }
-};
-
-// Reflections that are not occluded, for radial distributions with V-cavity in front: docs/math.md. Along the azimuth
-// e the slopes r e with reflections above the surface end at R on the side that faces i, and at 1 / (a R) on the other.
-template <class D>
-struct CavityLimits {
-  using V = Vec<D>;
-  V q, near, within, beyond;  // q.e, the nearer limit, the share within R and the one beyond
-  // e: of standard slopes.
-  template <class I>
-  HWY_INLINE CavityLimits(D d, const I& i, V ex, V ey, V& far2) {
-    const V iz = Select(i.front, Max(i.z, Set(d, 0x1p-60f)), Set(d, 1.0f));
-    const V x = i.ax * ex, y = i.ay * ey;
-    const V a = Fma(x, x, y * y);
-    q = Fma(i.wx, ex, i.wy * ey) / iz;
-    const V sum = Abs(q) + Sqrt(Fma(q, q, a));
-    near = Set(d, 1.0f) / sum;
-    const V far = Min(sum / a, Set(d, 1e15f));
-    far2 = far * far;
-    within = I::Distribution::Within(d, far2, beyond);
-  }
-};
-
-struct CavityExact : SlopeNormals {
-  static constexpr bool kUsesU3 = true;
-  static constexpr bool kVisible = true;
-  static constexpr bool kNIsSigma = false;
-  static constexpr bool kShifted = true;
-  static constexpr bool kExact = true;
-  static constexpr bool kNormals = false;
-
-  // U_R i.m / (m_z w), w = 2 beyond the nearer limit, else min(i.m / (m_z i_z), 2).
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V TwoNOf(D, const I& i, const CavityLimits<D>& limits, V r, V mz, V im) {
-    const V n = im / (mz + mz);
-    const V both = Max(n, i.z);
-    return (limits.within + limits.within) * Select(r < limits.near, both, n);
-  }
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D d, const I& i, V mx, V my, V mz, V im) {
-    const V one = Set(d, 1.0f), zero = Zero(d);
-    const V x = mx * i.ay, y = my * i.ax;  // slopes times -m_z ax ay
-    const V length = Sqrt(Fma(x, x, y * y));
-    const auto vertical = length < Set(d, 1e-18f);
-    const V scale = one / Select(vertical, one, length);
-    V far2;
-    const CavityLimits<D> limits(d, i, Select(vertical, one, x * scale), Select(vertical, zero, y * scale), far2);
-    const V r = length / (mz * (i.ax * i.ay));
-    return Select(i.front, TwoNOf(d, i, limits, r, mz, im), CavityVisible::TwoN(d, i, mx, my, mz, im));
-  }
-
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V& u3, Drawn<D>& drawn) {
-    const V one = Set(d, 1.0f);
-    V ex, ey, far2;
-    SinCosTurn(d, u1, ey, ex);
-    const CavityLimits<D> limits(d, i, ex, ey, far2);
-    // 1 - u2 within = (1 - u2) + u2 beyond
-    const V r = Sqrt(I::Distribution::SquaredRadius(d, u2 * limits.within, Fma(u2, limits.beyond, one - u2)));
-    // i faces slopes with q r < 0.
-    const V steep = Abs(limits.q) * r;
-    const auto flipped = And(r < limits.near, u3 + u3 < one - steep);
-    const V towards = Xor(SignBit(d), And(limits.q, SignBit(d)));
-    const V sign = Xor(towards, IfThenElseZero(flipped, SignBit(d)));
-    const V x = Xor(r * ex, sign), y = Xor(r * ey, sign);
-    FromSlope(d, i, x, y, drawn);
-    drawn.im = Max(i.z * Select(flipped, one - steep, one + steep), Set(d, kSmallestIm));
-    drawn.two_n = TwoNOf(d, i, limits, r, one, drawn.im);
-    if (!i.all_front) {
-      Drawn<D> behind;
-      V rest = u3;
-      CavityVisible::Draw(d, i, u1, u2, rest, behind);
-      drawn.mx = Select(i.front, drawn.mx, behind.mx);
-      drawn.my = Select(i.front, drawn.my, behind.my);
-      drawn.mm = Select(i.front, drawn.mm, behind.mm);
-      drawn.im = Select(i.front, drawn.im, behind.im);
-      drawn.two_n = Select(i.front, drawn.two_n, behind.two_n);
-      drawn.sx = Select(i.front, drawn.sx, behind.sx);
-      drawn.sy = Select(i.front, drawn.sy, behind.sy);
-    }
   }
 };
 

@@ -1,9 +1,9 @@
 // Run and RunStream: the request's columns are read to where the engine reads them, and the engine writes
 // the response's columns where gRPC sends them from.
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
@@ -19,7 +19,6 @@ using wire::MessageReader;
 using Request = v1::BatchRequest;
 
 constexpr std::size_t kAlignment = 64;
-constexpr std::size_t kInputs = 17;
 
 absl::string_view view(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -33,7 +32,7 @@ class Decoder {
  public:
   // Every column is in the message once, so its size and the alignment of each bound the memory.
   explicit Decoder(grpc::ByteBuffer& message)
-      : reader_(message), block_(message.Length() + (kInputs + 1) * kAlignment) {}
+      : reader_(message), block_(message.Length() + (input_fields().size() + 1) * kAlignment) {}
 
   absl::Status read();
   absl::Status make_batch(const Limits& limits, Batch& batch);
@@ -69,7 +68,7 @@ class Decoder {
   std::optional<Operation> operation_;
   std::uint64_t lanes_ = 0;
   unsigned outputs_ = 0;
-  std::array<Bytes, kInputs> inputs_;
+  std::vector<Bytes> inputs_{input_fields().size()};
   bool has_generator_ = false;
   Generator generator_;
   Bytes generator_id_;
@@ -244,12 +243,6 @@ absl::Status Decoder::read_column(absl::string_view name, std::size_t width,
   return absl::OkStatus();
 }
 
-// False for the columns of other interfaces than the model's.
-bool interface_reads(const Model& model, std::string_view field) {
-  if (field == "eta") return model.interface == Interface::dielectric;
-  return field != "f0" || model.interface == Interface::schlick;
-}
-
 // The wire's own checks; the rest is for the engine's.
 absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
   const auto unknown = [](absl::string_view field, int value) {
@@ -294,9 +287,8 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
   const auto fields = input_fields();
   for (std::size_t k = 0; k < fields.size(); ++k) {
     const Bytes& column = inputs_[k];
-    const bool random = fields[k].name.front() == 'u';
-    const bool expected = (fields[k].operations & bit(*operation_)) && !fields[k].otherwise &&
-                          !(random && has_generator_) && interface_reads(batch.model, fields[k].name);
+    const bool expected = reads(*operation_, batch.model, batch.sampler, fields[k]) && !fields[k].otherwise &&
+                          !(fields[k].random && has_generator_);
     if (column.size > 0)
       fields[k].column(batch) = {reinterpret_cast<const float*>(column.data), column.size / 4};
     else if (lanes_ == 0 && expected)

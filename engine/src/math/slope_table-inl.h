@@ -4,11 +4,11 @@
 // Every function takes the stretched unit incident direction as cos(theta), sin(theta) >= 0, cos(phi),
 // sin(phi), and is for HWY's tags and pairs of them alike. Any input, NaN too, reads inside the tables.
 
-#if defined(FACETWISE_TABLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef FACETWISE_TABLE_INL_H_
-#undef FACETWISE_TABLE_INL_H_
+#if defined(FACETWISE_SLOPE_TABLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_SLOPE_TABLE_INL_H_
+#undef FACETWISE_SLOPE_TABLE_INL_H_
 #else
-#define FACETWISE_TABLE_INL_H_
+#define FACETWISE_SLOPE_TABLE_INL_H_
 #endif
 
 #include "facetwise/slope_table.h"

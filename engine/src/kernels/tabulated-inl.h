@@ -4,28 +4,22 @@
 // Smith masking needs normals whose mean slope is that which the batch gives. A table's own is added to it, so that slopes here are
 // centred, and taken off where the tables are looked up.
 
-#if defined(FACETWISE_TABLE_POLICY_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef FACETWISE_TABLE_POLICY_INL_H_
-#undef FACETWISE_TABLE_POLICY_INL_H_
+#if defined(FACETWISE_TABULATED_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_TABULATED_INL_H_
+#undef FACETWISE_TABULATED_INL_H_
 #else
-#define FACETWISE_TABLE_POLICY_INL_H_
+#define FACETWISE_TABULATED_INL_H_
 #endif
 
-#include "src/kernels/slopes-inl.h"
-#include "src/kernels/vcavity-inl.h"
-#include "src/math/table-inl.h"
+#include "src/kernels/sampler-inl.h"
+#include "src/math/slope_table-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-struct Tabulated {
-  static constexpr bool kShifts = false;
-  static constexpr float kLargestRoughness = kLargestAlpha;
-  static constexpr bool kLongChains = false;
+struct Tabulated : DistributionTraits {
   static constexpr bool kOwnMean = true;
-  static constexpr bool kHasShare = false;
-  static constexpr bool kCavityBehind = false;
   // Below it D counts as this much, so that densities have quotients.
   static constexpr float kSmallestDensity = 1e-30f;
 
@@ -48,20 +42,19 @@ struct Tabulated {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V TwoArea(D d, const I& i, V wx, V wy, V wz) {
     V c, s, ex, ey, nu;
-    Incidence(d, i, wx, wy, wz, c, s, ex, ey, nu);
+    Seen(d, i, wx, wy, wz, c, s, ex, ey, nu);
     return Max((nu + nu) * ProjectedArea(d, *i.table, c, s, ex, ey), Set(d, 1e-20f));
   }
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Incidence(D d, const I& i, V wx, V wy, V wz, V& c, V& s, V& ex, V& ey, V& nu) {
+  static HWY_INLINE void Seen(D d, const I& i, V wx, V wy, V wz, V& c, V& s, V& ex, V& ey, V& nu) {
     const V one = Set(d, 1.0f);
     if constexpr (I::Surface::kAffine)
       wz = Fma(wx, Set(d, i.table->mean_x), Fma(wy, Set(d, i.table->mean_y), wz));
     const V a = Fma(wx, wx, wy * wy);
     const V horizontal = Sqrt(a);
-    const auto vertical = horizontal < Set(d, 1e-15f);
-    const V scale = one / Select(vertical, one, horizontal);
-    ex = Select(vertical, one, wx * scale);
-    ey = Select(vertical, Zero(d), wy * scale);
+    const Azimuth<D> azimuth(d, wx, wy, horizontal);
+    ex = azimuth.ex;
+    ey = azimuth.ey;
     nu = Sqrt(Fma(wz, wz, a));
     const V inverse = one / Max(nu, Set(d, 1e-30f));
     c = wz * inverse;
@@ -70,11 +63,11 @@ struct Tabulated {
 
   template <class D, class I>
   static HWY_INLINE void Area(D d, I& i) {
-    i.t = TwoArea(d, i, i.wx, i.wy, i.wz);
+    i.two_sigma = TwoArea(d, i, i.wx, i.wy, i.wz);
   }
   template <class D, class I>
   static HWY_INLINE void BiasedArea(D d, I& i) {
-    i.tn = TwoArea(d, i, i.wx, i.wy, Abs(i.wz));
+    i.two_normaliser = TwoArea(d, i, i.wx, i.wy, Abs(i.wz));
   }
   // sigma(-o) is sigma(o) - z' of centred normals.
   template <class D, class I, class V = Vec<D>>
@@ -108,14 +101,10 @@ struct Tabulated {
   }
 };
 
-// What the tables' samplers share: `Sampler::Drawing(d, i, mx, my, mz)` is the density of standard normals.
-template <class Sampler>
-struct TableNormals {
+// What the tables' samplers share: `Drawer::DrawingDensity(d, i, mx, my, mz)` is the density of standard normals.
+template <class Drawer>
+struct TableNormals : SamplerTraits {
   static constexpr bool kUnit = true;
-  static constexpr bool kNIsSigma = false;
-  static constexpr bool kShifted = true;
-  static constexpr bool kExact = false;
-  static constexpr bool kNormals = true;
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Density(D d, const I& i, const Drawn<D>& drawn, V, V& numerator, V& denominator) {
@@ -126,12 +115,12 @@ struct TableNormals {
   static HWY_INLINE V TwoN(D d, const I& i, V mx, V my, V mz, V im) {
     V density, length2;
     Tabulated::Lookup(d, i, mx, my, mz, density, length2);
-    return TwoNOf(d, im, density, length2, Sampler::Drawing(d, i, mx, my, mz));
+    return TwoNOf(d, im, density, length2, Drawer::DrawingDensity(d, i, mx, my, mz));
   }
   template <class D, class V = Vec<D>>
   static HWY_INLINE V TwoNOf(D d, V im, V density, V length2, V drawing) {
     const V two_n = (im + im) * density / (drawing * Sqrt(length2));
-    return Select(drawing > Zero(d), Min(two_n, Set(d, 3e38f)), Set(d, 3e38f));
+    return Select(drawing > Zero(d), Min(two_n, Set(d, kLargestDensity)), Set(d, kLargestDensity));
   }
   // M from a unit m_hat of the table.
   template <class D, class I, class V = Vec<D>>
@@ -140,17 +129,16 @@ struct TableNormals {
     Tabulated::FromTable(d, i, mx, my, mz);
     Unstretch(i, mx, my, mz, drawn);
     drawn.im = Dot(i.wx, i.wy, i.wz, mx, my, mz);
-    if constexpr (Sampler::kVisible) drawn.im = Max(drawn.im, Set(d, kSmallestIm));
+    if constexpr (Drawer::kVisible) drawn.im = Max(drawn.im, Set(d, kSmallestIm));
     drawn.two_n = TwoNOf(d, drawn.im, density, Set(d, 1.0f), drawing);
   }
 };
 
 struct TableNdf : TableNormals<TableNdf> {
-  static constexpr bool kUsesU3 = false;
   static constexpr bool kVisible = false;
 
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V Drawing(D d, const I& i, V mx, V my, V mz) {
+  static HWY_INLINE V DrawingDensity(D d, const I& i, V mx, V my, V mz) {
     const V one = Set(d, 1.0f), zero = Zero(d);
     return VisibleNormalDensity(d, *i.table, one, zero, one, zero, mx, my, mz);
   }
@@ -164,19 +152,16 @@ struct TableNdf : TableNormals<TableNdf> {
 };
 
 struct TableVisible : TableNormals<TableVisible> {
-  static constexpr bool kUsesU3 = false;
-  static constexpr bool kVisible = true;
-
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V Drawing(D d, const I& i, V mx, V my, V mz) {
+  static HWY_INLINE V DrawingDensity(D d, const I& i, V mx, V my, V mz) {
     V c, s, ex, ey, nu;
-    Tabulated::Incidence(d, i, i.wx, i.wy, i.wz, c, s, ex, ey, nu);
+    Tabulated::Seen(d, i, i.wx, i.wy, i.wz, c, s, ex, ey, nu);
     return VisibleNormalDensity(d, *i.table, c, s, ex, ey, mx, my, mz);
   }
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     V c, s, ex, ey, nu, mx, my, mz, drawing;
-    Tabulated::Incidence(d, i, i.wx, i.wy, i.wz, c, s, ex, ey, nu);
+    Tabulated::Seen(d, i, i.wx, i.wy, i.wz, c, s, ex, ey, nu);
     DrawVisibleNormal(d, *i.table, c, s, ex, ey, u1, u2, mx, my, mz, drawing);
     Finish(d, i, mx, my, mz, drawing, drawn);
   }
@@ -185,19 +170,18 @@ struct TableVisible : TableNormals<TableVisible> {
 // V-cavity in front, of a radial table: a normal as TableNdf draws it or its mirror image, by how much they face i.
 struct TableCavity : TableNormals<TableCavity> {
   static constexpr bool kUsesU3 = true;
-  static constexpr bool kVisible = true;
 
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V Drawing(D d, const I& i, V mx, V my, V mz) {
+  static HWY_INLINE V DrawingDensity(D d, const I& i, V mx, V my, V mz) {
     const V zero = Zero(d);
     const V across = Fma(i.wx, mx, i.wy * my), up = i.wz * mz;
     const V facing = Max(up + across, zero), other = Max(up - across, zero);
-    const V both = TableNdf::Drawing(d, i, mx, my, mz) + TableNdf::Drawing(d, i, Neg(mx), Neg(my), mz);
+    const V both = TableNdf::DrawingDensity(d, i, mx, my, mz) + TableNdf::DrawingDensity(d, i, Neg(mx), Neg(my), mz);
     return both * facing / Max(facing + other, Set(d, kSmallestIm));
   }
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V& u3, Drawn<D>& drawn) {
-    const V one = Set(d, 1.0f), zero = Zero(d), below_one = Set(d, 1.0f - 0x1p-24f);
+    const V one = Set(d, 1.0f), zero = Zero(d), below_one = Set(d, kLargestBelowOne);
     V mx, my, mz, unused;
     DrawVisibleNormal(d, *i.table, one, zero, one, zero, u1, u2, mx, my, mz, unused);
     const V across = Fma(i.wx, mx, i.wy * my), up = i.wz * mz;
@@ -208,7 +192,7 @@ struct TableCavity : TableNormals<TableCavity> {
     mx = Xor(mx, sign);
     my = Xor(my, sign);
     u3 = Min(Max(Select(mirrored, at - a1, at) / Max(Select(mirrored, a2, a1), Set(d, kSmallestIm)), zero), below_one);
-    Finish(d, i, mx, my, mz, Drawing(d, i, mx, my, mz), drawn);
+    Finish(d, i, mx, my, mz, DrawingDensity(d, i, mx, my, mz), drawn);
   }
 };
 

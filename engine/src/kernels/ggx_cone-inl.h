@@ -1,21 +1,18 @@
-// The exact reflection sampler: visible normals whose reflection is not occluded, in exact proportion.
-// Derivation: docs/math.md, "The exact reflection sampler"; the symbols are those used there.
+// The cone of GGX's unoccluded normals, for i_z > 0. Derivation: docs/math.md, "The exact reflection sampler"; the symbols are those
+// used there.
 
-#if defined(FACETWISE_EXACT_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef FACETWISE_EXACT_INL_H_
-#undef FACETWISE_EXACT_INL_H_
+#if defined(FACETWISE_GGX_CONE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef FACETWISE_GGX_CONE_INL_H_
+#undef FACETWISE_GGX_CONE_INL_H_
 #else
-#define FACETWISE_EXACT_INL_H_
+#define FACETWISE_GGX_CONE_INL_H_
 #endif
 
-#include "src/kernels/samplers-inl.h"
+#include "src/kernels/surface-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
-
-// Likewise the smallest m_hat_z (kRim, operations-inl.h).
-inline constexpr float kRimZ = 0x1p-30f;
 
 // The elliptic cone of unoccluded normals, for i_z > 0.
 template <class D>
@@ -170,7 +167,7 @@ template <class D, class I, class V = Vec<D>>
 HWY_INLINE void MakeAffineCone(D d, const I& i, Cone<D>& cone) {
   const V one = Set(d, 1.0f), tiny = Set(d, kSmallestA);
   // Lanes behind the surface do not use the cone.
-  const V z = Select(i.front, Max(i.z, Set(d, 0x1p-60f)), one);
+  const V z = Select(i.front, Max(i.z, Set(d, kTiny)), one);
   const V qx = i.ax * Fma(z, i.mean_x, i.x), qy = i.ay * Fma(z, i.mean_y, i.y);
   const V slope2 = Fma(i.mean_x, i.mean_x, i.mean_y * i.mean_y);
   // 2 z' - i_z (1 + mean^2) = i_z (1 - mean^2) - 2 mean.i
@@ -222,91 +219,12 @@ HWY_INLINE void MakeConeOf(D d, const I& i, const Roughness<D>& roughness, Cone<
 
 // K / sigma(i).
 template <class D, class I, class V = Vec<D>>
-HWY_INLINE V ConeShare(D d, const I& i) {
+HWY_INLINE V ShareInCone(D d, const I& i) {
   const V one = Set(d, 1.0f);
   Cone<D> cone;
   MakeConeOf(d, i, Roughness<D>(d, i), cone);
-  return Select(i.front, Min(cone.two_k / i.t, one), one);
+  return Select(i.front, Min(cone.two_k / i.two_sigma, one), one);
 }
-
-struct Exact {
-  static constexpr bool kUnit = false;
-  static constexpr bool kUsesU3 = true;
-  static constexpr bool kVisible = true;
-  static constexpr bool kNIsSigma = false;
-  static constexpr bool kShifted = true;
-  static constexpr bool kExact = true;
-  static constexpr bool kNormals = false;
-
-  // m_hat is of unit length in front, else a half vector.
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Density(D d, const I& i, const Drawn<D>& drawn, V rho, V& numerator, V& denominator) {
-    const V one = Set(d, 1.0f);
-    numerator = drawn.mm * drawn.mm;
-    denominator = one;
-    if (!i.all_front) {
-      numerator = Select(i.front, numerator, one);
-      denominator = Select(i.front, one, rho * rho);
-    }
-  }
-
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE V TwoN(D d, const I& i, V, V, V, V) {
-    Cone<D> cone;
-    MakeConeOf(d, i, Roughness<D>(d, i), cone);
-    return Select(i.front, cone.two_k, i.tn);
-  }
-
-  template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V& u3, Drawn<D>& drawn) {
-    const Roughness<D> roughness(d, i);
-    Cone<D> cone;
-    MakeConeOf(d, i, roughness, cone);
-    const V rim = Set(d, kRimZ);
-    V sin, cos;
-    SinCosTurn(d, u2, sin, cos);
-
-    // A point (xi, eta) of the ellipse, uniformly; the point of the sphere above it, along the axis v.
-    const V lambda_u = cone.lambda * u1;
-    const V rp = Sqrt(lambda_u * cone.inverse_p);
-    V rq = rp;
-    if (I::Surface::kAffine || !roughness.all_isotropic) rq = Sqrt(lambda_u * cone.inverse_q);
-    const V xi = rp * cos, eta = rq * sin;
-    const V along = Fma(xi, cone.vx, eta * cone.vy);
-    const V y = Neg(along * cone.inverse_n2);
-    // zeta^2 v.v = 1 - xi^2 - eta^2 + along^2 / v.v. At the rim 1 - xi^2 - eta^2 cancels; by 1 = (lambda + px) / P it
-    // is a sum of positive terms.
-    const V left = NegFma(cone.lambda, u1, cone.lambda);  // lambda (1 - u1)
-    const V cp = cos * cos * cone.inverse_p, sq = sin * sin * cone.inverse_q;
-    const V inside = Fma(cp, left + cone.px, sq * (left + cone.py));
-    const V zeta = Sqrt(Fma(y, y, inside * cone.inverse_n2));
-
-    // The sample or its mirror image about the axis, in proportion to w.m_hat.
-    const V across = Fma(xi, i.wx, eta * i.wy);
-    const V g_zeta = cone.g * zeta;
-    const V threshold = Fma(cone.g, y, across) + g_zeta;
-    const auto mirrored = u3 * (g_zeta + g_zeta) >= threshold;
-    const V sign = IfThenElseZero(mirrored, SignBit(d));
-    const V hz = Max(zeta + Xor(y, sign), rim);
-    const V hx = Fma(hz, cone.vx, Xor(xi, sign)), hy = Fma(hz, cone.vy, Xor(eta, sign));
-    Unstretch(i, hx, hy, hz, drawn);
-    drawn.im = Max(Dot(i.wx, i.wy, i.wz, hx, hy, hz), Set(d, kSmallestIm));
-    drawn.two_n = cone.two_k;
-
-    // Behind, nothing is occluded: the cap.
-    const auto front = i.front;
-    if (!i.all_front) {
-      Drawn<D> cap;
-      Cap::Draw(d, i, u1, u2, u3, cap);
-      drawn.mx = Select(front, drawn.mx, cap.mx);
-      drawn.my = Select(front, drawn.my, cap.my);
-      drawn.mz = Select(front, drawn.mz, cap.mz);
-      drawn.mm = Select(front, drawn.mm, cap.mm);
-      drawn.im = Select(front, drawn.im, cap.im);
-      drawn.two_n = Select(front, drawn.two_n, cap.two_n);
-    }
-  }
-};
 
 }  // namespace HWY_NAMESPACE
 }  // namespace facetwise

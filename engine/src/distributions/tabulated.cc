@@ -1,12 +1,13 @@
 // Tabulated's kernels.
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "src/distributions/table.cc"
+#define HWY_TARGET_INCLUDE "src/distributions/tabulated.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
 
 #include "hwy/highway.h"
 #include "src/kernels/register-inl.h"
-#include "src/kernels/table-inl.h"
-#include "src/kernels/vcavity-inl.h"
+#include "src/kernels/smith-inl.h"
+#include "src/kernels/tabulated-inl.h"
+#include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
