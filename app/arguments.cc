@@ -63,10 +63,6 @@ absl::StatusOr<Model> ModelArguments::open() const {
   return opened;
 }
 
-Sampler default_sampler(Operation operation, const Model& model) {
-  return wire::default_sampler(operation, model);
-}
-
 void EngineArguments::add_remote(CLI::App& app) {
   app.add_option("--remote", remote,
                  "Servers that run it instead of this machine: unix:PATH or HOST:PORT, separated by commas")

@@ -44,9 +44,6 @@ struct ModelArguments {
   absl::StatusOr<Model> open() const;
 };
 
-// The sampler that a verb means where none is named: exact where the model has it, else visible.
-Sampler default_sampler(Operation operation, const Model& model);
-
 // Which engine runs a call: this machine's, or servers.
 struct EngineArguments {
   std::vector<std::string> remote;

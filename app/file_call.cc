@@ -81,8 +81,10 @@ class Inputs {
     for (const std::string& name : table_.names())
       if (!known_column(name))
         return invalid("{}: unknown column {}; known are{}", shown(), name, known_inputs());
+    // u3 comes last: by then it is known which sampler the other columns make the default.
     for (const InputField& field : input_fields()) {
       const std::string column = file_name(field.name);
+      batch.sampler = call_.sampler.value_or(default_sampler(call_.operation, batch));
       if (const auto given = constant(call_, column)) {
         if (find(column) >= 0) return invalid("{}: {} has a column {} too", given->option, shown(), column);
         field.column(batch) = given->value;
@@ -92,7 +94,7 @@ class Inputs {
         if (find(column) >= 0) return invalid("--seed: {} has a column {} too", shown(), column);
         continue;
       }
-      if (!reads(call_.operation, call_.model, call_.sampler, field) || (field.otherwise && find(column) < 0)) continue;
+      if (!reads(call_.operation, call_.model, batch.sampler, field) || (field.otherwise && find(column) < 0)) continue;
       if (auto status = take(column, field.random, field.column(batch)); !status.ok()) return status;
     }
     batch.lanes = table_.rows();
@@ -145,7 +147,6 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   if (!input.ok()) return input.status();
   Batch batch;
   batch.model = call.model;
-  batch.sampler = call.sampler;
   Inputs inputs(call, **input);
   if (auto status = inputs.fill(batch); !status.ok()) return status;
 
@@ -164,7 +165,7 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   if (!statistics.ok()) return statistics.status();
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   if (auto status = (*output)->commit(); !status.ok()) return status;
-  return FileCallResult{.statistics = *statistics, .ignored = inputs.ignored(), .seconds = seconds.count()};
+  return FileCallResult{.statistics = *statistics, .sampler = batch.sampler, .ignored = inputs.ignored(), .seconds = seconds.count()};
 }
 
 }  // namespace facetwise::app

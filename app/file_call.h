@@ -16,7 +16,7 @@ namespace facetwise::app {
 struct FileCall {
   Operation operation = Operation::sample_reflection;
   Model model;
-  Sampler sampler = Sampler::exact;
+  std::optional<Sampler> sampler;     // nothing: default_sampler() of the model and the columns
   std::vector<float> alpha;           // alpha_x, and alpha_y if it differs, for all lanes; else columns
   std::optional<float> eta, f0, f90;  // for all lanes; else columns
   std::optional<std::uint64_t> seed;  // of the generator; else columns u1, u2, u3
@@ -26,6 +26,7 @@ struct FileCall {
 
 struct FileCallResult {
   Statistics statistics;
+  Sampler sampler;  // that was used
   std::vector<std::string> ignored;  // columns that facetwise knows and this call does not read
   double seconds = 0;                // of the call, without reading and writing
 };

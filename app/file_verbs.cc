@@ -64,7 +64,7 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
                                          {"distribution", name(call.model.distribution)},
                                          {"masking", name(call.model.masking)},
                                          {"interface", name(call.model.interface)},
-                                         {"sampler", name(call.sampler)},
+                                         {"sampler", name(result.sampler)},
                                          {"engine", verb_arguments.engine.shown()},
                                          {"lanes", s.lanes()},
                                          {"accepted", s.accepted},
@@ -79,7 +79,7 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
   fmt::print(
       stderr,
       "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
-      verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(call.sampler),
+      verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(result.sampler),
       verb_arguments.engine.shown(), 1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
@@ -131,7 +131,7 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation,
             auto model = arguments->model.open();
             if (!model.ok()) return fail(verb, model.status());
             call.model = *std::move(model);
-            call.sampler = arguments->sampler.value_or(default_sampler(call.operation, call.model));
+            call.sampler = arguments->sampler;
             auto engine = arguments->engine.open();
             if (!engine.ok()) return fail(verb, engine.status());
             const auto result = run_on_files(call, **engine);

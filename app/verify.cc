@@ -218,19 +218,14 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
 std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
   std::vector<VerifyCase> cases;
   add_ggx_smith(samplers, cases);
-  for (const Distribution distribution :
-       {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong})
-    for (const Masking masking : {Masking::smith, Masking::vcavity})
-      add_composition({.distribution = distribution, .masking = masking}, samplers, cases);
+  for (const Model& model : all_models()) add_composition(model, samplers, cases);
   // Mean slopes and correlated roughness.
   if (std::find(samplers.begin(), samplers.end(), Sampler::visible) == samplers.end()) return cases;
-  for (const Distribution distribution : {Distribution::ggx, Distribution::beckmann})
+  for (const Model& model : all_models())
     for (const Operation operation :
          {Operation::sample_normal, Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
-      cases.push_back({.operation = operation,
-                       .model = {.distribution = distribution},
-                       .sampler = Sampler::visible,
-                       .moments = true});
+      if (takes_slopes(model))
+        cases.push_back({.operation = operation, .model = model, .sampler = Sampler::visible, .moments = true});
   return cases;
 }
 

@@ -26,12 +26,6 @@ constexpr Sampler kMemorySamplers[] = {Sampler::cap, Sampler::exact};
 // GGX's with Smith masking: `visible` is `cap`.
 constexpr Sampler kGgxSamplers[] = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact};
 
-// The other models, in the order of their results.
-constexpr std::pair<Distribution, Masking> kModels[] = {
-    {Distribution::beckmann, Masking::smith},   {Distribution::student_t, Masking::smith},
-    {Distribution::ggx, Masking::vcavity},      {Distribution::beckmann, Masking::vcavity},
-    {Distribution::student_t, Masking::vcavity}, {Distribution::phong, Masking::vcavity}};
-
 bool has_baseline(const Case& which) {
   if (which.inputs == Inputs::generator) return false;  // it takes its random numbers from columns alone
   if (which.scatters()) return false;
@@ -91,8 +85,9 @@ std::vector<Case> model_cases() {
       cases.back().sampler = sampler;
     }
   };
-  for (const auto& [distribution, masking] : kModels)
-    for (const Operation operation : all_operations()) add(operation, distribution, masking);
+  for (const Model& model : all_models())
+    if (model.distribution != Distribution::ggx || model.masking != Masking::smith)
+      for (const Operation operation : all_operations()) add(operation, model.distribution, model.masking);
   for (const Operation operation : all_operations())
     if (operation >= Operation::sample_transmission) add(operation, Distribution::ggx, Masking::smith);
   return cases;

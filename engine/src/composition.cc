@@ -96,6 +96,31 @@ std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
   return samplers_for(operation, model, false);
 }
 
+Sampler default_sampler(Operation operation, const Batch& batch) {
+  const bool exact = operation <= Operation::evaluate_scattering && operation != Operation::masking &&
+                     find_kernel(any_kernels(), operation, batch.model, Sampler::exact, is_affine(batch));
+  return exact ? Sampler::exact : Sampler::visible;
+}
+
+std::vector<Model> all_models(const std::shared_ptr<const SlopeTable>& table) {
+  std::vector<Model> models;
+  for (const Masking masking : {Masking::smith, Masking::vcavity})
+    for (std::size_t k = 0; k < std::size(any_kernels().distribution); ++k) {
+      Model model{.distribution = static_cast<Distribution>(k), .masking = masking};
+      if (model.distribution == Distribution::table) {
+        // V-cavity's grooves are the same on both sides.
+        if (table == nullptr || (masking == Masking::vcavity && !table->radial())) continue;
+        model.table = table;
+      }
+      if (!samplers_for(Operation::sample_normal, model).empty()) models.push_back(model);
+    }
+  return models;
+}
+
+bool takes_slopes(const Model& model) {
+  return surface_of(kernels_of(model.distribution), model.masking, true).masking != nullptr;
+}
+
 absl::Status check_composition(Operation operation, const Batch& batch) {
   const Model& model = batch.model;
   if (operation > Operation::evaluate_scattering) return invalid("operation", "unknown value");

@@ -64,11 +64,12 @@ struct PhiloxTile {
 };
 
 // The kernels of a distribution with a masking, indexed by Sampler; entries that do not exist are null.
+inline constexpr std::size_t kSamplers = static_cast<std::size_t>(Sampler::visible) + 1;
 struct SurfaceKernels {
-  Kernel sample[6] = {};         // sample_normal, sample_reflection
-  Kernel query[6] = {};          // pdf_reflection, evaluate_reflection
-  Kernel scatter[6] = {};        // sample_transmission, sample_scattering
-  Kernel scatter_query[6] = {};  // evaluate_transmission, evaluate_scattering
+  Kernel sample[kSamplers] = {};         // sample_normal, sample_reflection
+  Kernel query[kSamplers] = {};          // pdf_reflection, evaluate_reflection
+  Kernel scatter[kSamplers] = {};        // sample_transmission, sample_scattering
+  Kernel scatter_query[kSamplers] = {};  // evaluate_transmission, evaluate_scattering
   Kernel masking = nullptr;
 };
 
@@ -77,8 +78,9 @@ struct DistributionKernels {
   SurfaceKernels smith, smith_affine, vcavity;
 };
 
+inline constexpr std::size_t kDistributions = static_cast<std::size_t>(Distribution::table) + 1;
 struct TargetKernels {
-  const DistributionKernels* distribution[5];  // indexed by Distribution; null at the end where there are no more
+  const DistributionKernels* distribution[kDistributions];  // indexed by Distribution
   void (*philox)(const PhiloxTile& tile);
   std::size_t vector_lanes;
   bool streams;              // there are streaming stores

@@ -1,6 +1,5 @@
 #include "wire/fields.h"
 
-#include <algorithm>
 #include <cctype>
 #include <stdexcept>
 #include <string>
@@ -101,8 +100,8 @@ std::optional<Interface> interface_from(int value) {
 std::optional<Transport> transport_from(int value) {
   return from(value, Transport::importance, std::optional(Transport::radiance));
 }
-std::optional<Sampler> sampler_from(int value, Operation operation, const Model& model) {
-  return from(value, Sampler::visible, std::optional(default_sampler(operation, model)));
+std::optional<Sampler> sampler_from(int value, Sampler unspecified) {
+  return from(value, Sampler::visible, std::optional(unspecified));
 }
 
 v1::Operation to_proto(Operation value) { return to<v1::Operation>(value); }
@@ -113,12 +112,6 @@ v1::Normalisation to_proto(Normalisation value) { return to<v1::Normalisation>(v
 v1::Interface to_proto(Interface value) { return to<v1::Interface>(value); }
 v1::Transport to_proto(Transport value) { return to<v1::Transport>(value); }
 v1::SamplerKind to_proto(Sampler value) { return to<v1::SamplerKind>(value); }
-
-Sampler default_sampler(Operation operation, const Model& model) {
-  const auto samplers = samplers_for(operation, model);
-  const bool exact = std::find(samplers.begin(), samplers.end(), Sampler::exact) != samplers.end();
-  return exact ? Sampler::exact : Sampler::visible;
-}
 
 unsigned outputs_of(Operation operation) {
   unsigned outputs = 0;

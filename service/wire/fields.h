@@ -43,7 +43,7 @@ std::optional<Shadowing> shadowing_from(int value);
 std::optional<Normalisation> normalisation_from(int value);
 std::optional<Interface> interface_from(int value);
 std::optional<Transport> transport_from(int value);
-std::optional<Sampler> sampler_from(int value, Operation operation, const Model& model);
+std::optional<Sampler> sampler_from(int value, Sampler unspecified);
 v1::Operation to_proto(Operation value);
 v1::Distribution to_proto(Distribution value);
 v1::Masking to_proto(Masking value);
@@ -52,9 +52,6 @@ v1::Normalisation to_proto(Normalisation value);
 v1::Interface to_proto(Interface value);
 v1::Transport to_proto(Transport value);
 v1::SamplerKind to_proto(Sampler value);
-
-// What an unspecified sampler means: exact where the model has it for the operation, else visible.
-Sampler default_sampler(Operation operation, const Model& model);
 
 // Bit (1 << Output) for each output that the operation has.
 unsigned outputs_of(Operation operation);

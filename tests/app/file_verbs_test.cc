@@ -175,6 +175,21 @@ TEST(Evaluate, ShadowingIsRead) {
   EXPECT_NE(correlated.out, uncorrelated.out);
 }
 
+// Where no sampler is named it is one that the columns allow: `exact` of Beckmann takes no mean slopes, GGX's does.
+TEST(Sample, DefaultSamplerFitsTheColumns) {
+  const std::string plain = "ix,iy,iz,alpha_x,alpha_y\n0.6,0,0.8,0.3,0.4\n";
+  const std::string sloped = "ix,iy,iz,alpha_x,alpha_y,mean_slope_x\n0.6,0,0.8,0.3,0.4,0.1\n";
+  const auto sampler = [](const std::string& distribution, const std::string& input) {
+    const auto result = facetwise({"sample", "--distribution", distribution, "--seed", "1", "--json"}, input);
+    EXPECT_EQ(result.code, 0) << result.err;
+    return nlohmann::json::parse(result.err)["sampler"].get<std::string>();
+  };
+  EXPECT_EQ(sampler("beckmann", plain), "exact");
+  EXPECT_EQ(sampler("beckmann", sloped), "visible");
+  EXPECT_EQ(sampler("ggx", sloped), "exact");
+  EXPECT_EQ(sampler("student_t", plain), "visible");
+}
+
 TEST(Sample, EmptyAndSingleRowTables) {
   for (const std::string extension : {"csv", "npy"}) {
     const Directory directory;

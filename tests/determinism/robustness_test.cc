@@ -43,7 +43,7 @@ Kind kind_of(const Call& call, const Lanes& lanes, std::size_t lane) {
     valid &= in_unit_interval(in(kU1)) && in_unit_interval(in(kU2));
     if (uses_u3({}, call.sampler)) valid &= in_unit_interval(in(kU3));
   }
-  for (const Input alpha : {kAlphaX, kAlphaY}) valid &= in(alpha) > 0 && in(alpha) <= 10;
+  for (const Input alpha : {kAlphaX, kAlphaY}) valid &= in(alpha) >= 0 && in(alpha) <= 10;
   if (unclear) return Kind::unclear;
   if (!valid) return Kind::invalid;
   return std::min(in(kAlphaX), in(kAlphaY)) < 1e-4f ? Kind::smooth : Kind::ordinary;

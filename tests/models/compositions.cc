@@ -78,15 +78,9 @@ std::vector<Sampler> samplers_of(const Family& family, Operation operation) {
 const std::vector<Family>& families() {
   static const std::vector<Family> all = [] {
     std::vector<Family> found;
-    for (const Distribution d :
-         {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong})
-      for (const Masking m : {Masking::smith, Masking::vcavity})
-        for (const bool affine : {false, true}) {
-          // V-cavity takes no moments: composition_test.cc.
-          if (affine && m == Masking::vcavity) continue;
-          const Family family{d, m, affine};
-          if (!samplers_of(family, Operation::sample_reflection).empty()) found.push_back(family);
-        }
+    for (const Model& model : all_models())
+      for (const bool affine : {false, true})
+        if (!affine || takes_slopes(model)) found.push_back({model.distribution, model.masking, affine});
     return found;
   }();
   return all;

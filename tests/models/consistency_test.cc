@@ -373,8 +373,8 @@ TEST_P(ModelConsistency, EveryBadInputIsInvalid) {
   const std::vector<Bad> bads = {
       {&Point::ix, {kNan, kInf, 2, -1.5f}},
       {&Point::iz, {kNan, -kInf, 0x1p80f}},
-      {&Point::alpha_x, {0, -0.5f, 10.01f, kNan, kInf}},
-      {&Point::alpha_y, {0, -1e-3f, 11, kNan, -kInf}},
+      {&Point::alpha_x, {-1e-40f, -0.5f, 10.01f, kNan, kInf}},
+      {&Point::alpha_y, {-0x1p-100f, -1e-3f, 11, kNan, -kInf}},
       {&Point::mean_x, {kNan, kInf, 1e30f, 151}},
       {&Point::mean_y, {kNan, -kInf, -151}},
       {&Point::correlation, {1, -1, 1.5f, kNan, kInf}},
@@ -414,6 +414,28 @@ TEST_P(ModelConsistency, EveryBadInputIsInvalid) {
             << name(operation) << " " << describe(c) << describe(points[n]);
         ASSERT_TRUE(all_zero(results[n])) << name(operation) << " " << describe(c) << describe(points[n]);
       }
+    }
+}
+
+// How scene files write a mirror: either axis, either sign.
+TEST_P(ModelConsistency, ZeroRoughnessIsSmooth) {
+  for (const Operation operation : operations())
+    for (const Composition& c : all_compositions(GetParam(), operation)) {
+      std::vector<Point> points(5);
+      points[0].alpha_x = 0;
+      points[1].alpha_y = -0.0f;
+      points[2].alpha_x = points[2].alpha_y = 0;
+      points[3].alpha_x = -0.0f, points[3].alpha_y = 0.7f, points[3].correlation = 0.5f;
+      points[4].alpha_x = points[4].alpha_y = 5e-5f;  // what was smooth all along
+      points[4].mean_x = points[4].mean_y = 0;
+      const std::vector<Result> results = run_points(operation, c, points);
+      for (std::size_t n = 0; n < points.size(); ++n)
+        ASSERT_EQ(results[n].status, static_cast<int>(LaneStatus::smooth))
+            << name(operation) << " " << describe(c) << describe(points[n]);
+      // A mirror is one mirror.
+      EXPECT_EQ(results[2].oz, results[4].oz);
+      EXPECT_EQ(results[2].weight, results[4].weight);
+      EXPECT_EQ(results[2].pdf, results[4].pdf);
     }
 }
 

@@ -321,6 +321,23 @@ TEST_F(MalformedCall, UnusualButGoodMessages) {
                "incident.y: given twice");
 }
 
+// The unspecified sampler is one that the columns allow.
+TEST_F(MalformedCall, UnspecifiedSamplerFitsTheColumns) {
+  constexpr std::size_t kLanes = 5;
+  v1::BatchRequest request = good_request(kLanes);
+  request.mutable_model()->set_distribution(v1::BECKMANN);
+  request.set_sampler(v1::SAMPLER_UNSPECIFIED);
+  for (const bool sloped : {false, true}) {
+    if (sloped) request.set_mean_slope_x(floats(kLanes, 0.1f));
+    v1::BatchResponse got, expected;
+    ASSERT_TRUE(run(request, &got).ok()) << sloped;
+    v1::BatchRequest named = request;
+    named.set_sampler(sloped ? v1::VISIBLE : v1::EXACT);
+    ASSERT_TRUE(run(named, &expected).ok());
+    EXPECT_EQ(got.SerializeAsString(), expected.SerializeAsString());
+  }
+}
+
 TEST_F(MalformedCall, EmptyBatches) {
   for (int operation = v1::SAMPLE_NORMAL; operation <= v1::MASKING; ++operation) {
     v1::BatchRequest request;

@@ -172,13 +172,9 @@ std::vector<Call> plain_calls() {
 std::vector<Call> all_calls() {
   std::vector<Call> calls;
   add_plain(calls);
-  for (const Masking masking : {Masking::smith, Masking::vcavity})
-    for (const Distribution distribution :
-         {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong})
-      if (distribution != Distribution::phong || masking == Masking::vcavity)
-        add_model({.distribution = distribution, .masking = masking}, false, calls);
-  for (const Distribution distribution : {Distribution::ggx, Distribution::beckmann})
-    add_model({.distribution = distribution}, true, calls);
+  for (const Model& model : all_models()) add_model(model, false, calls);
+  for (const Model& model : all_models())
+    if (takes_slopes(model)) add_model(model, true, calls);
 #ifdef FACETWISE_QUICK
   // For an emulator: all of plain GGX, and of the models every seventh.
   const std::size_t plain = plain_calls().size();

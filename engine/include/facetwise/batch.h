@@ -141,6 +141,12 @@ struct OutputField {
 // The samplers that a model has for an operation's draws or pdf, whatever columns are given; empty where the model itself
 // makes no sense, and for masking.
 std::vector<Sampler> samplers_for(Operation, const Model&);
+// `exact` where the batch's model and columns have it for the operation, else `visible`.
+Sampler default_sampler(Operation, const Batch&);
+// Every distribution with every masking that it has samplers for; tabulated ones if a table is given.
+std::vector<Model> all_models(const std::shared_ptr<const SlopeTable>& table = nullptr);
+// Whether a model takes mean slopes and correlated roughness.
+bool takes_slopes(const Model&);
 
 std::span<const InputField> input_fields();
 std::span<const OutputField> output_fields();

@@ -37,7 +37,7 @@ template <class D, class V = Vec<D>>
 HWY_INLINE LaneClasses<D> Classify(D d, Mask<D> inputs_valid, V ax, V ay, float largest_alpha) {
   // Min and Max of different instruction sets treat NaN differently, comparisons do not.
   const V zero = Zero(d), largest = Set(d, largest_alpha), smallest = Set(d, kSmallestAlpha);
-  const auto alpha_valid = And(And(ax > zero, ay > zero), And(ax <= largest, ay <= largest));
+  const auto alpha_valid = And(And(ax >= zero, ay >= zero), And(ax <= largest, ay <= largest));
   LaneClasses<D> classes;
   classes.valid = And(inputs_valid, alpha_valid);
   classes.smooth = And(classes.valid, Or(ax < smallest, ay < smallest));

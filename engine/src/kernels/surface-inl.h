@@ -46,7 +46,7 @@ struct DistributionTraits {
   static constexpr bool kCavityBehind = false;  // V-cavity has samplers for i_z <= 0
 };
 
-// Distribution: a policy as described in docs/adding-a-distribution.md.
+// Distribution: a policy as described in docs/adding.md.
 template <class Distribution_, class Masking_, bool kAffine_>
 struct Surface {
   using Distribution = Distribution_;

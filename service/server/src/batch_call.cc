@@ -270,8 +270,8 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
                  .interface = *interface,
                  .transport = *transport,
                  .retro = retro_};
-  const auto sampler = wire::sampler_from(sampler_, *operation_, batch.model);
-  if (!sampler) return unknown("sampler", sampler_);
+  // Until the columns are there, which decide what an unspecified one means.
+  if (!wire::sampler_from(sampler_, Sampler::visible)) return unknown("sampler", sampler_);
   if (auto status = check_lanes(lanes_, limits); !status.ok()) return status;
   if (const unsigned strange = outputs_ & ~wire::outputs_of(*operation_); strange != 0) {
     const auto output = static_cast<v1::Output>(std::countr_zero(strange));
@@ -279,19 +279,19 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
         "outputs", absl::StrCat(view(name(*operation_)), " does not compute ", v1::Output_Name(output)));
   }
 
-  batch.sampler = *sampler;
   batch.lanes = lanes_;
   // An empty column is an absent one, except in an empty batch, whose columns are all empty: there it is absent
   // if the call can do without it.
   static constexpr std::uint64_t kNothing = 0;
   const auto fields = input_fields();
+  for (std::size_t k = 0; k < fields.size(); ++k)
+    if (inputs_[k].size > 0)
+      fields[k].column(batch) = {reinterpret_cast<const float*>(inputs_[k].data), inputs_[k].size / 4};
+  batch.sampler = *wire::sampler_from(sampler_, default_sampler(*operation_, batch));
   for (std::size_t k = 0; k < fields.size(); ++k) {
-    const Bytes& column = inputs_[k];
     const bool expected = reads(*operation_, batch.model, batch.sampler, fields[k]) && !fields[k].otherwise &&
                           !(fields[k].random && has_generator_);
-    if (column.size > 0)
-      fields[k].column(batch) = {reinterpret_cast<const float*>(column.data), column.size / 4};
-    else if (lanes_ == 0 && expected)
+    if (inputs_[k].size == 0 && lanes_ == 0 && expected)
       fields[k].column(batch) = {reinterpret_cast<const float*>(&kNothing), 0};
   }
   if (has_generator_) {
