@@ -32,25 +32,23 @@ void ModelArguments::add(CLI::App& app) {
            const bool is_table = text.starts_with(kTable) && text.size() > kTable.size();
            const auto parsed = is_table ? Distribution::table : parse_distribution(text);
            if (!parsed || (*parsed == Distribution::table && !is_table))
-             throw CLI::ValidationError("--distribution",
-                                        fmt::format("\"{}\" is not one of {}", text, kDistributions));
+             throw CLI::ValidationError("--distribution", fmt::format("\"{}\" is not one of {}", text, kDistributions));
            model.distribution = *parsed;
            table = is_table ? text.substr(kTable.size()) : "";
          },
          "Distribution of normals; default ggx. A table is a file of slopes' densities")
       ->type_name(kDistributions);
-  add_named(app, "--masking", model.masking, parse_masking,
-            "Masking function; default smith; phong has vcavity alone", "smith|vcavity");
+  add_named(app, "--masking", model.masking, parse_masking, "Masking function; default smith; phong has vcavity alone",
+            "smith|vcavity");
   add_named(app, "--shadowing", model.shadowing, parse_shadowing,
             "Masking-shadowing of weights and values; default correlated", "correlated|uncorrelated");
   add_named(app, "--normalisation", model.normalisation, parse_normalisation,
-            "Densities of visible normals for directions behind the surface; default unbiased",
-            "unbiased|biased");
+            "Densities of visible normals for directions behind the surface; default unbiased", "unbiased|biased");
   add_named(app, "--interface", model.interface, parse_interface,
             "What reflects: all (conductor, the default), by Schlick's formula (f0, f90) or Fresnel's (eta)",
             "conductor|schlick|dielectric");
-  add_named(app, "--transport", model.transport, parse_transport,
-            "What transmission carries; default radiance", "radiance|importance");
+  add_named(app, "--transport", model.transport, parse_transport, "What transmission carries; default radiance",
+            "radiance|importance");
   app.add_flag("--retro", model.retro, "Reflect back to where the light comes from");
 }
 
@@ -74,14 +72,12 @@ void EngineArguments::add_remote(CLI::App& app) {
 
 void EngineArguments::add_target(CLI::App& app) {
   add_named(app, "--target", target, parse_target,
-            "Instruction set of the local kernels; the bits are the same on each",
-            "best|scalar|avx2|avx3|neon");
+            "Instruction set of the local kernels; the bits are the same on each", "best|scalar|avx2|avx3|neon");
 }
 
 absl::StatusOr<std::unique_ptr<Engine>> EngineArguments::open() const {
   if (!remote.empty()) {
-    if (target != Target::best)
-      return invalid("--target: a server chooses its own; leave out --target or --remote");
+    if (target != Target::best) return invalid("--target: a server chooses its own; leave out --target or --remote");
     return connect(remote);
   }
   if (!resolve(target)) return invalid("--target: this CPU or build has no {}", name(target));

@@ -24,8 +24,7 @@ CLI::Option* add_named(CLI::App& app, const std::string& flag, T& value, Parse p
           flag,
           [&value, parse, names, flag](const std::string& text) {
             const auto parsed = parse(text);
-            if (!parsed)
-              throw CLI::ValidationError(flag, fmt::format("\"{}\" is not one of {}", text, names));
+            if (!parsed) throw CLI::ValidationError(flag, fmt::format("\"{}\" is not one of {}", text, names));
             value = *parsed;
           },
           help)

@@ -29,8 +29,7 @@ struct BenchVerb {
       if (!created.ok()) return fail("bench", created.status());
       file.emplace(*std::move(created));
     }
-    const auto report =
-        at.empty() ? run_here() : benchmark_server(at, options.filter, options.min_seconds, show);
+    const auto report = at.empty() ? run_here() : benchmark_server(at, options.filter, options.min_seconds, show);
     if (!report.ok()) return fail("bench", report.status());
     fmt::print("{}", bench_table(*report));
     if (!file) return kDone;
@@ -57,8 +56,8 @@ struct BenchVerb {
 
   static bool show(const BenchProgress& progress) {
     if (progress.result != nullptr)
-      fmt::print(stderr, "[{}/{}] {}: {:.3g} ns a sample\n", progress.done, progress.total,
-                 progress.result->name(), progress.result->ns_per_sample);
+      fmt::print(stderr, "[{}/{}] {}: {:.3g} ns a sample\n", progress.done, progress.total, progress.result->name(),
+                 progress.result->ns_per_sample);
     else
       fmt::print(stderr, "[{}/{}] {}\n", progress.done, progress.total, progress.part);
     return true;
@@ -70,8 +69,7 @@ struct BenchVerb {
 Verb add_bench(CLI::App& app) {
   auto arguments = std::make_shared<BenchVerb>();
   BenchOptions& options = arguments->options;
-  CLI::App& command =
-      *app.add_subcommand("bench", "Measure throughput, the machine's limits and rejection counts");
+  CLI::App& command = *app.add_subcommand("bench", "Measure throughput, the machine's limits and rejection counts");
   command.footer(
       R"(Implementations: scalar (plain std:: code, as a renderer contains it), one-lane (the kernel without
 vectors), simd (one thread), simd-threads, and remote (with --remote). Each result is shown beside the
@@ -85,41 +83,30 @@ Examples:
   facetwise bench --filter 'sample_reflection/exact/0.3,0.3/65536/.*' --min-seconds 1
   facetwise bench --filter 'sample_reflection/beckmann-smith/visible/0.3,0.3/65536/.*'
   facetwise bench --at render7:7777 --filter 'sample_reflection/.*/65536/simd$')");
-  command
-      .add_option("--filter", options.filter,
-                  "Run the benchmarks whose names contain this regular expression")
+  command.add_option("--filter", options.filter, "Run the benchmarks whose names contain this regular expression")
       ->option_text("REGEX");
-  auto* quick =
-      command.add_flag("--quick", arguments->quick, "Fewer: about 50 seconds; default at most 3 minutes");
+  auto* quick = command.add_flag("--quick", arguments->quick, "Fewer: about 50 seconds; default at most 3 minutes");
   auto* full = command.add_flag("--full", arguments->full, "All: about an hour")->excludes(quick);
-  command
-      .add_option("--min-seconds", options.min_seconds,
-                  "Seconds that each benchmark runs, up to 10; default 0.2")
+  command.add_option("--min-seconds", options.min_seconds, "Seconds that each benchmark runs, up to 10; default 0.2")
       ->option_text("S");
-  auto* threads =
-      command.add_option("--threads", options.threads, "Threads of simd-threads; default all cores")
-          ->check(CLI::Range(1, 4096))
-          ->option_text("N");
+  auto* threads = command.add_option("--threads", options.threads, "Threads of simd-threads; default all cores")
+                      ->check(CLI::Range(1, 4096))
+                      ->option_text("N");
   add_named(command, "--target", options.target, parse_target, "Instruction set of the kernels; default best",
             "best|scalar|avx2|avx3|neon");
-  auto* limits =
-      command.add_flag("--no-limits", arguments->no_limits, "Leave out copy bandwidth and peak of FMA");
-  auto* rejections =
-      command.add_flag("--no-rejections", arguments->no_rejections, "Leave out the rejection counts");
-  auto* targets =
-      command.add_flag("--no-targets", arguments->no_targets, "Leave out the performance to reach");
-  auto* flags =
-      command
-          .add_option("--benchmark-flag", options.benchmark_flags,
-                      "A flag of Google Benchmark, as in --benchmark-flag=--benchmark_repetitions=9")
-          ->allow_extra_args(false)
-          ->option_text("FLAG");
+  auto* limits = command.add_flag("--no-limits", arguments->no_limits, "Leave out copy bandwidth and peak of FMA");
+  auto* rejections = command.add_flag("--no-rejections", arguments->no_rejections, "Leave out the rejection counts");
+  auto* targets = command.add_flag("--no-targets", arguments->no_targets, "Leave out the performance to reach");
+  auto* flags = command
+                    .add_option("--benchmark-flag", options.benchmark_flags,
+                                "A flag of Google Benchmark, as in --benchmark-flag=--benchmark_repetitions=9")
+                    ->allow_extra_args(false)
+                    ->option_text("FLAG");
   arguments->engine.add_remote(command);
   auto* remote = command.get_option("--remote");
   remote->description("Measure these servers too: unix:PATH or HOST:PORT, separated by commas");
-  auto* at =
-      command.add_option("--at", arguments->at,
-                         "Run on this server's machine instead (it must allow it: serve --allow-benchmark)");
+  auto* at = command.add_option("--at", arguments->at,
+                                "Run on this server's machine instead (it must allow it: serve --allow-benchmark)");
   at->option_text("ADDRESS");
   for (CLI::Option* here :
        {quick, full, threads, command.get_option("--target"), limits, rejections, targets, flags, remote})

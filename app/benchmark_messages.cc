@@ -48,28 +48,27 @@ BenchResult from_message(const v1::BenchmarkResult& message) {
 }  // namespace
 
 BenchmarkRunner benchmark_runner(Target target, int threads) {
-  return
-      [target, threads](const v1::BenchmarkRequest& request, const BenchmarkReport& report) -> absl::Status {
-        BenchOptions options;
-        options.filter = request.filter();
-        if (request.min_seconds() > 0) options.min_seconds = request.min_seconds();
-        options.threads = threads;
-        options.target = target;
-        options.limits = options.rejections = options.targets = false;
-        const auto result = run_bench(options, [&](const BenchProgress& progress) {
-          v1::BenchmarkProgress message;
-          message.set_done(static_cast<std::uint32_t>(progress.done));
-          message.set_total(static_cast<std::uint32_t>(progress.total));
-          if (progress.result != nullptr) *message.mutable_result() = to_message(*progress.result);
-          return report(message);
-        });
-        // Cancelled is what `report` asked for.
-        return result.ok() || absl::IsCancelled(result.status()) ? absl::OkStatus() : result.status();
-      };
+  return [target, threads](const v1::BenchmarkRequest& request, const BenchmarkReport& report) -> absl::Status {
+    BenchOptions options;
+    options.filter = request.filter();
+    if (request.min_seconds() > 0) options.min_seconds = request.min_seconds();
+    options.threads = threads;
+    options.target = target;
+    options.limits = options.rejections = options.targets = false;
+    const auto result = run_bench(options, [&](const BenchProgress& progress) {
+      v1::BenchmarkProgress message;
+      message.set_done(static_cast<std::uint32_t>(progress.done));
+      message.set_total(static_cast<std::uint32_t>(progress.total));
+      if (progress.result != nullptr) *message.mutable_result() = to_message(*progress.result);
+      return report(message);
+    });
+    // Cancelled is what `report` asked for.
+    return result.ok() || absl::IsCancelled(result.status()) ? absl::OkStatus() : result.status();
+  };
 }
 
-absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const std::string& filter,
-                                             double min_seconds, const BenchCallback& progress) {
+absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const std::string& filter, double min_seconds,
+                                             const BenchCallback& progress) {
   constexpr std::chrono::seconds kPatience{5};
   const auto failed = [&](const grpc::Status& status) {
     return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
@@ -90,8 +89,7 @@ absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const s
   request.set_min_seconds(min_seconds);
   const auto reader = stub->Benchmark(&context, request);
   for (v1::BenchmarkProgress message; reader->Read(&message);) {
-    BenchProgress now{
-        .done = message.done(), .total = message.total(), .result = nullptr, .part = "throughput"};
+    BenchProgress now{.done = message.done(), .total = message.total(), .result = nullptr, .part = "throughput"};
     if (message.has_result()) now.result = &report.results.emplace_back(from_message(message.result()));
     if (progress && !progress(now)) context.TryCancel();
   }

@@ -14,7 +14,7 @@ BenchmarkRunner benchmark_runner(Target target, int threads);
 
 // Asks a server to benchmark its machine. `progress` is called after each result. Errors begin with
 // "server ADDRESS:".
-absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const std::string& filter,
-                                             double min_seconds, const BenchCallback& progress);
+absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const std::string& filter, double min_seconds,
+                                             const BenchCallback& progress);
 
 }  // namespace facetwise::app

@@ -13,10 +13,12 @@
 namespace facetwise::app {
 namespace {
 
-// A field's name in files: "incident.x" is ix, "out.outgoing.x" ox, "out.normal.x" mx; the others are called as they are.
+// A field's name in files: "incident.x" is ix, "out.outgoing.x" ox, "out.normal.x" mx; the others are called as they
+// are.
 std::string file_name(std::string_view field) {
   if (field.starts_with("out.")) field.remove_prefix(4);
-  constexpr std::pair<std::string_view, char> kDirections[] = {{"incident.", 'i'}, {"outgoing.", 'o'}, {"normal.", 'm'}};
+  constexpr std::pair<std::string_view, char> kDirections[] = {
+      {"incident.", 'i'}, {"outgoing.", 'o'}, {"normal.", 'm'}};
   for (const auto& [prefix, letter] : kDirections)
     if (field.starts_with(prefix)) return {letter, field.back()};
   return std::string(field);
@@ -26,7 +28,8 @@ std::string file_name(std::string_view field) {
 std::vector<const OutputField*> written_fields(const FileCall& call) {
   std::vector<const OutputField*> fields;
   for (const OutputField& field : output_fields())
-    if (computes(call.operation, call.model, field) && field.name != "out.incident_dot_normal") fields.push_back(&field);
+    if (computes(call.operation, call.model, field) && field.name != "out.incident_dot_normal")
+      fields.push_back(&field);
   return fields;
 }
 std::vector<const ByteField*> written_bytes(const FileCall& call) {
@@ -74,13 +77,11 @@ std::optional<Constant> constant(const FileCall& call, std::string_view column) 
 // Turns a table's columns into a batch's inputs.
 class Inputs {
  public:
-  Inputs(const FileCall& call, InputTable& table)
-      : call_(call), table_(table), used_(table.names().size(), false) {}
+  Inputs(const FileCall& call, InputTable& table) : call_(call), table_(table), used_(table.names().size(), false) {}
 
   absl::Status fill(Batch& batch) {
     for (const std::string& name : table_.names())
-      if (!known_column(name))
-        return invalid("{}: unknown column {}; known are{}", shown(), name, known_inputs());
+      if (!known_column(name)) return invalid("{}: unknown column {}; known are{}", shown(), name, known_inputs());
     // u3 comes last: by then it is known which sampler the other columns make the default.
     for (const InputField& field : input_fields()) {
       const std::string column = file_name(field.name);
@@ -121,7 +122,7 @@ class Inputs {
   absl::Status take(std::string_view name, bool random, Column<float>& column) {
     const int index = find(name);
     if (index < 0) {
-      const std::string_view instead = random ? " (or give --seed instead of columns u1 u2 u3)"
+      const std::string_view instead = random                      ? " (or give --seed instead of columns u1 u2 u3)"
                                        : name.starts_with("alpha") ? " (or give --alpha)"
                                        : name == "eta"             ? " (or give --eta)"
                                        : name == "f0"              ? " (or give --f0)"
@@ -165,7 +166,8 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   if (!statistics.ok()) return statistics.status();
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   if (auto status = (*output)->commit(); !status.ok()) return status;
-  return FileCallResult{.statistics = *statistics, .sampler = batch.sampler, .ignored = inputs.ignored(), .seconds = seconds.count()};
+  return FileCallResult{
+      .statistics = *statistics, .sampler = batch.sampler, .ignored = inputs.ignored(), .seconds = seconds.count()};
 }
 
 }  // namespace facetwise::app

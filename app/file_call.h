@@ -26,7 +26,7 @@ struct FileCall {
 
 struct FileCallResult {
   Statistics statistics;
-  Sampler sampler;  // that was used
+  Sampler sampler;                   // that was used
   std::vector<std::string> ignored;  // columns that facetwise knows and this call does not read
   double seconds = 0;                // of the call, without reading and writing
 };

@@ -49,8 +49,7 @@ struct Variant {
 };
 constexpr Variant kSampleVariants[] = {
     {"--normals", Operation::sample_normal, "Sample microfacet normals instead of reflections"},
-    {"--transmission", Operation::sample_transmission,
-     "Sample what goes through a dielectric instead of reflections"},
+    {"--transmission", Operation::sample_transmission, "Sample what goes through a dielectric instead of reflections"},
     {"--scattering", Operation::sample_scattering, "Sample either of the two, as a dielectric reflects"}};
 constexpr Variant kEvaluateVariants[] = {
     {"--transmission", Operation::evaluate_transmission, "Of what goes through a dielectric"},
@@ -76,17 +75,15 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
     fmt::print(stderr, "{}\n", json.dump());
     return;
   }
-  fmt::print(
-      stderr,
-      "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
-      verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(result.sampler),
-      verb_arguments.engine.shown(), 1e3 * result.seconds);
+  fmt::print(stderr, "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
+             verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(result.sampler),
+             verb_arguments.engine.shown(), 1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
 }
 
-Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation,
-                   std::span<const Variant> variants, const std::string& about, const std::string& columns) {
+Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, std::span<const Variant> variants,
+                   const std::string& about, const std::string& columns) {
   auto arguments = std::make_shared<FileVerb>();
   FileCall& call = arguments->call;
   call.operation = operation;

@@ -21,8 +21,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::uint64_t memory_bytes() {
-  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
-         static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
 }
 
 Json local_info() {
@@ -42,8 +41,7 @@ absl::StatusOr<Json> remote_info(const std::string& address) {
   context.set_deadline(std::chrono::system_clock::now() + kPatience);
   v1::InfoResponse info;
   const grpc::Status status = stub->Info(&context, {}, &info);
-  if (!status.ok())
-    return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
+  if (!status.ok()) return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
   Json targets = Json::array();
   for (const std::string& target : info.available_targets()) targets.push_back(target);
   return Json{{"version", info.version()},
@@ -76,14 +74,12 @@ Verb add_info(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App& command = *app.add_subcommand("info", "Print the version, the instruction sets and the machine");
   command.footer("Examples:\n  facetwise info\n  facetwise info --json --remote unix:/tmp/facetwise.sock");
-  command
-      .add_option("--remote", arguments->remote,
-                  "A server's instead of this machine's: unix:PATH or HOST:PORT")
+  command.add_option("--remote", arguments->remote, "A server's instead of this machine's: unix:PATH or HOST:PORT")
       ->option_text("ADDRESS");
   command.add_flag("--json", arguments->json, "As JSON");
   return {&command, [arguments] {
-            const absl::StatusOr<Json> info = arguments->remote.empty() ? absl::StatusOr<Json>(local_info())
-                                                                        : remote_info(arguments->remote);
+            const absl::StatusOr<Json> info =
+                arguments->remote.empty() ? absl::StatusOr<Json>(local_info()) : remote_info(arguments->remote);
             if (!info.ok()) return fail("info", info.status());
             if (arguments->json)
               fmt::print("{}\n", info->dump(1));

@@ -38,11 +38,8 @@ struct ServeVerb {
 };
 
 std::string check_mode(const std::string& text) {
-  const bool octal =
-      !text.empty() && text.size() <= 4 && text.find_first_not_of("01234567") == std::string::npos;
-  return octal && std::stoul(text, nullptr, 8) <= 0777
-             ? ""
-             : fmt::format("\"{}\" is not a mode such as 0660", text);
+  const bool octal = !text.empty() && text.size() <= 4 && text.find_first_not_of("01234567") == std::string::npos;
+  return octal && std::stoul(text, nullptr, 8) <= 0777 ? "" : fmt::format("\"{}\" is not a mode such as 0660", text);
 }
 
 }  // namespace
@@ -65,12 +62,10 @@ Examples:
       ->required()
       ->allow_extra_args(false)
       ->option_text("unix:PATH|HOST:PORT (required)");
-  command
-      .add_option("--threads", options.threads, "Threads that compute; default as many as there are cores")
+  command.add_option("--threads", options.threads, "Threads that compute; default as many as there are cores")
       ->check(CLI::Range(1, 4096))
       ->option_text("N");
-  command
-      .add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
+  command.add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
       ->check(CLI::Range(1, 2047))
       ->option_text("N");
   command
@@ -79,8 +74,7 @@ Examples:
       ->check(CLI::Range(1, 1 << 24))
       ->option_text("N");
   command
-      .add_option("--max-calls", options.max_calls,
-                  "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
+      .add_option("--max-calls", options.max_calls, "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
       ->check(CLI::Range(1, 1 << 20))
       ->option_text("N");
   command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
@@ -91,10 +85,9 @@ Examples:
                   "Longest wait for calls in flight at the end; default 10")
       ->check(CLI::Range(0, 86400))
       ->option_text("N");
-  command.add_flag("--allow-benchmark", options.allow_benchmark,
-                   "Let clients run benchmarks on this machine");
-  add_named(command, "--target", options.execution.target, parse_target,
-            "Instruction set of the kernels; default best", "best|scalar|avx2|avx3|neon");
+  command.add_flag("--allow-benchmark", options.allow_benchmark, "Let clients run benchmarks on this machine");
+  add_named(command, "--target", options.execution.target, parse_target, "Instruction set of the kernels; default best",
+            "best|scalar|avx2|avx3|neon");
   return {&command, [arguments] { return arguments->run(); }};
 }
 

@@ -58,8 +58,7 @@ struct Table {
 
   explicit Table(const Json& report) {
     for (const Json& result : report.at("results")) {
-      const auto found =
-          std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
+      const auto found = std::find(kImplementations.begin(), kImplementations.end(), result.at("implementation"));
       if (found == kImplementations.end() || result.value("inputs", "columns") != "columns") continue;
       const Json& alpha = result.at("alpha");  // or "mixed"
       const auto key = alpha.is_array() ? std::pair<double, double>(alpha.at(0), alpha.at(1)) : std::pair(0.0, 0.0);
@@ -82,14 +81,14 @@ struct Table {
                "SIMD/scalar", "threads/SIMD", "remote/SIMD");
     for (const Group& group : groups) {
       // The roughness that most implementations were measured at.
-      const auto& [alpha, row] = *std::max_element(
-          group.by_alpha.begin(), group.by_alpha.end(),
-          [](const auto& a, const auto& b) { return a.second.measured() < b.second.measured(); });
+      const auto& [alpha, row] =
+          *std::max_element(group.by_alpha.begin(), group.by_alpha.end(),
+                            [](const auto& a, const auto& b) { return a.second.measured() < b.second.measured(); });
       const auto& rate = row.rate;
-      fmt::print(kLine, group.operation, group.sampler, alpha_text(alpha.first, alpha.second),
-                 millions(rate[kScalar]), millions(rate[kAuto]), millions(rate[kOneLane]), millions(rate[kSimd]),
-                 millions(rate[kThreads]), millions(rate[kRemote]), ratio(rate[kSimd], rate[kScalar]),
-                 ratio(rate[kThreads], rate[kSimd]), ratio(rate[kRemote], rate[kSimd]));
+      fmt::print(kLine, group.operation, group.sampler, alpha_text(alpha.first, alpha.second), millions(rate[kScalar]),
+                 millions(rate[kAuto]), millions(rate[kOneLane]), millions(rate[kSimd]), millions(rate[kThreads]),
+                 millions(rate[kRemote]), ratio(rate[kSimd], rate[kScalar]), ratio(rate[kThreads], rate[kSimd]),
+                 ratio(rate[kRemote], rate[kSimd]));
     }
   }
 };
@@ -102,16 +101,15 @@ void print_verification(const Json& verification) {
   fmt::print("\nReal input\n");
   fmt::print("  mesh {}: {} triangles\n", verification.at("mesh").get<std::string>(), count("triangles"));
   fmt::print("  {} rays, {:.1f} % hit; {} lanes, {:.1f} % backfacing\n", count("rays"),
-             percent(count("hits"), count("rays")), count("lanes"),
-             percent(count("backfacing"), count("lanes")));
+             percent(count("hits"), count("rays")), count("lanes"), percent(count("backfacing"), count("lanes")));
   fmt::print("  server against this process: {} bytes, {}\n", count("bytes_compared"),
              verification.at("equal").get<bool>() ? "every one equal" : "DIFFERENT");
   fmt::print("\nReflections occluded on it, by sampler\n");
   for (const Json& sampler : verification.at("reflections")) {
     const auto occluded = sampler.at("occluded").get<std::uint64_t>(),
                samples = sampler.at("samples").get<std::uint64_t>();
-    fmt::print("  {:<24} {:>9} of {} ({:.2f} %)\n", sampler_name(sampler), occluded,
-               samples, percent(occluded, samples));
+    fmt::print("  {:<24} {:>9} of {} ({:.2f} %)\n", sampler_name(sampler), occluded, samples,
+               percent(occluded, samples));
   }
 }
 
@@ -128,8 +126,8 @@ int run(const std::string& report_path, const std::string& verification_path) {
     print_verification(*verification);
     Table(*report).print();
   } catch (const Json::exception& error) {
-    return fail("summary", invalid("{}, {}: not what bench and verify write: {}", report_path,
-                                   verification_path, error.what()));
+    return fail("summary",
+                invalid("{}, {}: not what bench and verify write: {}", report_path, verification_path, error.what()));
   }
   return kDone;
 }
@@ -141,12 +139,9 @@ Verb add_summary(CLI::App& app) {
     std::string report, verification;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App& command =
-      *app.add_subcommand("summary", "Print a summary of what bench and verify wrote as JSON");
+  CLI::App& command = *app.add_subcommand("summary", "Print a summary of what bench and verify wrote as JSON");
   command.footer("Example:\n  facetwise summary --report out/report.json --verification out/verify.json");
-  command.add_option("--report", arguments->report, "What `bench --json` wrote")
-      ->required()
-      ->type_name("FILE");
+  command.add_option("--report", arguments->report, "What `bench --json` wrote")->required()->type_name("FILE");
   command.add_option("--verification", arguments->verification, "What `verify --json` wrote")
       ->required()
       ->type_name("FILE");

@@ -15,8 +15,7 @@ namespace {
 
 // All outputs of an operation.
 struct Answer {
-  std::vector<std::vector<float>>
-      columns;  // as output_fields(); empty where the operation has no such output
+  std::vector<std::vector<float>> columns;       // as output_fields(); empty where the operation has no such output
   std::vector<std::vector<std::uint8_t>> bytes;  // as byte_fields()
   Statistics statistics;
   double seconds = 0;
@@ -47,8 +46,7 @@ absl::StatusOr<Answer> ask(Engine& engine, Operation operation, Batch batch, std
 
 // Says where two columns differ; nothing where they do not.
 template <class T>
-std::string column_difference(std::string_view name, const std::vector<T>& remote,
-                              const std::vector<T>& local) {
+std::string column_difference(std::string_view name, const std::vector<T>& remote, const std::vector<T>& local) {
   if (remote.empty() || std::memcmp(remote.data(), local.data(), remote.size() * sizeof(T)) == 0) return {};
   std::size_t count = 0, first = 0;
   for (std::size_t lane = remote.size(); lane-- > 0;)
@@ -59,8 +57,7 @@ std::string column_difference(std::string_view name, const std::vector<T>& remot
 
 std::string difference(const Answer& remote, const Answer& local) {
   for (std::size_t k = 0; k < local.columns.size(); ++k)
-    if (auto text = column_difference(output_fields()[k].name, remote.columns[k], local.columns[k]);
-        !text.empty())
+    if (auto text = column_difference(output_fields()[k].name, remote.columns[k], local.columns[k]); !text.empty())
       return text;
   for (std::size_t k = 0; k < local.bytes.size(); ++k)
     if (auto text = column_difference(byte_fields()[k].name, remote.bytes[k], local.bytes[k]); !text.empty())
@@ -230,8 +227,7 @@ std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
 }
 
 bool Verification::equal() const {
-  return std::all_of(batches.begin(), batches.end(),
-                     [](const auto& batch) { return batch.difference.empty(); });
+  return std::all_of(batches.begin(), batches.end(), [](const auto& batch) { return batch.difference.empty(); });
 }
 
 std::uint64_t Verification::lanes() const {
@@ -240,8 +236,7 @@ std::uint64_t Verification::lanes() const {
   return total;
 }
 
-absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera,
-                                    const VerifyOptions& options,
+absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera, const VerifyOptions& options,
                                     const std::function<void(const VerifiedBatch&)>& progress) {
   const auto cases = verify_cases(options.samplers);
   Verification verification;

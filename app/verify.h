@@ -54,8 +54,7 @@ struct VerifyOptions {
 
 // Traces the batches, has each answered by both engines and compares the answers. An error is a call that
 // failed; a difference is in the result. `progress` is called after each batch.
-absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera,
-                                    const VerifyOptions& options,
+absl::StatusOr<Verification> verify(Engine& remote, Engine& local, scene::Camera& camera, const VerifyOptions& options,
                                     const std::function<void(const VerifiedBatch&)>& progress);
 
 }  // namespace facetwise::app

@@ -78,8 +78,7 @@ struct Totals {
       if (batch.what.operation != Operation::sample_reflection) continue;
       // Retro-reflection and mean slopes have shares of their own.
       if (batch.what.model.retro || batch.what.moments) continue;
-      Count& count =
-          reflections[{batch.what.model.distribution, batch.what.model.masking, batch.what.sampler}];
+      Count& count = reflections[{batch.what.model.distribution, batch.what.model.masking, batch.what.sampler}];
       count.samples += batch.statistics.lanes();
       count.occluded += batch.statistics.occluded;
     }
@@ -91,8 +90,8 @@ void print(const Verification& verification, const std::string& mesh) {
   fmt::print("mesh        {}: {} triangles\n", mesh, verification.triangles);
   fmt::print("rays        {}, of which {} hit ({:.1f} %)\n", verification.rays, verification.hits,
              percent(verification.hits, verification.rays));
-  fmt::print("lanes       {} in {} batches, {} backfacing ({:.1f} %)\n", totals.lanes,
-             verification.batches.size(), totals.backfacing, percent(totals.backfacing, totals.lanes));
+  fmt::print("lanes       {} in {} batches, {} backfacing ({:.1f} %)\n", totals.lanes, verification.batches.size(),
+             totals.backfacing, percent(totals.backfacing, totals.lanes));
   for (const auto& [what, count] : totals.reflections) {
     const auto& [distribution, masking, sampler] = what;
     fmt::print("occluded    {:<26} {:>9} of {} reflections ({:.2f} %)\n",
@@ -180,8 +179,7 @@ struct VerifyVerb {
       const Statistics& s = batch.statistics;
       fmt::print(stderr, "[{:>2}/{}] {:<64} {} lanes, {:5.2f} % occluded, remote {:5.1f} M/s: {}\n", ++done,
                  options.batches, shown(batch.what), s.lanes(), percent(s.occluded, s.lanes()),
-                 millions(s.lanes(), batch.remote_seconds),
-                 batch.difference.empty() ? "equal" : batch.difference);
+                 millions(s.lanes(), batch.remote_seconds), batch.difference.empty() ? "equal" : batch.difference);
     });
     if (!verification.ok()) return fail("verify", verification.status());
     print(*verification, mesh);
@@ -200,8 +198,7 @@ struct VerifyVerb {
 
 Verb add_verify(CLI::App& app) {
   auto arguments = std::make_shared<VerifyVerb>();
-  CLI::App& command =
-      *app.add_subcommand("verify", "Compare every byte of servers' answers with this machine's");
+  CLI::App& command = *app.add_subcommand("verify", "Compare every byte of servers' answers with this machine's");
   command.footer(
       R"(Rays are traced from a fixed camera at a mesh; what they hit, with normals bent by a procedural
 normal map and roughness that varies over the mesh, is sent batch by batch, and every answer is
@@ -232,14 +229,12 @@ Examples:
             if (text == "all") return;
             const auto sampler = parse_sampler(text);
             if (!sampler)
-              throw CLI::ValidationError("--sampler",
-                                         fmt::format("\"{}\" is not one of {}|all", text, kSamplerNames));
+              throw CLI::ValidationError("--sampler", fmt::format("\"{}\" is not one of {}|all", text, kSamplerNames));
             arguments->options.samplers = {*sampler};
           },
           "Only this sampler; default all")
       ->type_name(std::string(kSamplerNames) + "|all");
-  command.add_option("--seed", arguments->options.seed, "Seed of the random numbers; default 1")
-      ->type_name("N");
+  command.add_option("--seed", arguments->options.seed, "Seed of the random numbers; default 1")->type_name("N");
   command.add_option("--json", arguments->json, "Write the result as JSON")->type_name("FILE");
   return {&command, [arguments] { return arguments->run(); }};
 }

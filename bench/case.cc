@@ -17,8 +17,8 @@ constexpr std::size_t kBatches[] = {256, 4096, 65536, std::size_t{1} << 20, std:
 constexpr std::size_t kBatch = 65536, kLargestBatch = std::size_t{1} << 24;
 // Mixed roughness first (Case).
 constexpr std::pair<float, float> kAlphas[] = {{0, 0}, {0.3f, 0.3f}, {0.8f, 0.1f}, {0.01f, 0.01f}, {1.0f, 1.0f}};
-constexpr Implementation kImplementations[] = {Implementation::scalar, Implementation::auto_vectorised,
-                                               Implementation::one_lane, Implementation::simd,
+constexpr Implementation kImplementations[] = {Implementation::scalar,       Implementation::auto_vectorised,
+                                               Implementation::one_lane,     Implementation::simd,
                                                Implementation::simd_threads, Implementation::remote};
 constexpr Sampler kReflectionSamplers[] = {Sampler::bounded, Sampler::exact};
 // Those whose speed in memory is shown: the simplest, and facetwise's own.
@@ -58,8 +58,7 @@ class List {
 };
 
 // Operations with the samplers they take.
-std::vector<Case> operations(std::span<const Sampler> query_samplers,
-                             std::span<const Sampler> normal_samplers) {
+std::vector<Case> operations(std::span<const Sampler> query_samplers, std::span<const Sampler> normal_samplers) {
   std::vector<Case> cases;
   for (const Sampler sampler : normal_samplers)
     cases.push_back({.operation = Operation::sample_normal, .sampler = sampler});
@@ -146,15 +145,13 @@ std::vector<Case> all_cases() {
   constexpr Sampler kNormals[] = {Sampler::ndf, Sampler::heitz, Sampler::cap};
   for (const std::size_t batch : kBatches) {
     for (const auto& [alpha_x, alpha_y] : kAlphas) {
-      for (const Inputs inputs :
-           {Inputs::columns, Inputs::malloc_placed, Inputs::fresh, Inputs::one_roughness, Inputs::generator,
-            Inputs::backfacing}) {
+      for (const Inputs inputs : {Inputs::columns, Inputs::malloc_placed, Inputs::fresh, Inputs::one_roughness,
+                                  Inputs::generator, Inputs::backfacing}) {
         // There is no one mixed roughness, and the largest batch is fresh as it is.
         if (inputs == Inputs::one_roughness && alpha_x == 0) continue;
         if (inputs == Inputs::fresh && batch == kLargestBatch) continue;
         for (const Sampler sampler : kGgxSamplers)
-          list.add(
-              {.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
+          list.add({.sampler = sampler, .alpha_x = alpha_x, .alpha_y = alpha_y, .batch = batch, .inputs = inputs});
       }
       for (Case which : operations(kGgxSamplers, kNormals)) {
         which.alpha_x = alpha_x;
@@ -177,36 +174,24 @@ std::vector<Case> all_cases() {
 
 std::string_view name(Implementation implementation) {
   switch (implementation) {
-    case Implementation::scalar:
-      return "scalar";
-    case Implementation::auto_vectorised:
-      return "auto";
-    case Implementation::one_lane:
-      return "one-lane";
-    case Implementation::simd:
-      return "simd";
-    case Implementation::simd_threads:
-      return "simd-threads";
-    case Implementation::remote:
-      return "remote";
+    case Implementation::scalar: return "scalar";
+    case Implementation::auto_vectorised: return "auto";
+    case Implementation::one_lane: return "one-lane";
+    case Implementation::simd: return "simd";
+    case Implementation::simd_threads: return "simd-threads";
+    case Implementation::remote: return "remote";
   }
   return "";
 }
 
 std::string_view name(Inputs inputs) {
   switch (inputs) {
-    case Inputs::columns:
-      return "columns";
-    case Inputs::malloc_placed:
-      return "malloc";
-    case Inputs::fresh:
-      return "fresh";
-    case Inputs::one_roughness:
-      return "one-roughness";
-    case Inputs::generator:
-      return "generator";
-    case Inputs::backfacing:
-      return "backfacing";
+    case Inputs::columns: return "columns";
+    case Inputs::malloc_placed: return "malloc";
+    case Inputs::fresh: return "fresh";
+    case Inputs::one_roughness: return "one-roughness";
+    case Inputs::generator: return "generator";
+    case Inputs::backfacing: return "backfacing";
   }
   return "";
 }
@@ -229,8 +214,8 @@ int Case::output_columns() const {
 
 bool Case::comparable(const Case& other) const {
   return operation == other.operation && distribution == other.distribution && masking == other.masking &&
-         sampler == other.sampler && alpha_x == other.alpha_x &&
-         alpha_y == other.alpha_y && batch == other.batch && inputs == other.inputs;
+         sampler == other.sampler && alpha_x == other.alpha_x && alpha_y == other.alpha_y && batch == other.batch &&
+         inputs == other.inputs;
 }
 
 BenchResult describe(const Case& which) {
@@ -291,22 +276,12 @@ int flops(const Case& which) {
   if (which.is_sampling()) {
     int draw = 0;
     switch (*which.sampler) {
-      case Sampler::ndf:
-        draw = 26;
-        break;
-      case Sampler::heitz:
-        draw = 56;
-        break;
+      case Sampler::ndf: draw = 26; break;
+      case Sampler::heitz: draw = 56; break;
       case Sampler::cap:
-      case Sampler::visible:
-        draw = 31;
-        break;
-      case Sampler::bounded:
-        draw = 31 + kBound;
-        break;
-      case Sampler::exact:
-        draw = cone + (isotropic ? 60 : 62);
-        break;
+      case Sampler::visible: draw = 31; break;
+      case Sampler::bounded: draw = 31 + kBound; break;
+      case Sampler::exact: draw = cone + (isotropic ? 60 : 62); break;
     }
     const int normal = which.operation == Operation::sample_normal ? 8 : 0;
     return kLength + kPrepare + kSinCos + draw + kReflect + normal;
@@ -316,20 +291,12 @@ int flops(const Case& which) {
   if (which.operation != Operation::pdf_reflection) sum += kShadowing;
   if (which.sampler) {
     switch (*which.sampler) {
-      case Sampler::ndf:
-        sum += 5;
-        break;
+      case Sampler::ndf: sum += 5; break;
       case Sampler::heitz:
       case Sampler::cap:
-      case Sampler::visible:
-        sum += 2;
-        break;
-      case Sampler::bounded:
-        sum += 2 + kBound;
-        break;
-      case Sampler::exact:
-        sum += 1 + cone;
-        break;
+      case Sampler::visible: sum += 2; break;
+      case Sampler::bounded: sum += 2 + kBound; break;
+      case Sampler::exact: sum += 1 + cone; break;
     }
   }
   return sum;

@@ -143,9 +143,7 @@ Batch Columns::batch(const Case& which, std::size_t first) const {
       batch.out.outgoing = {out(0), out(1), out(2)};
       batch.out.pdf = out(3);
       break;
-    case Operation::pdf_reflection:
-      batch.out.pdf = out(0);
-      break;
+    case Operation::pdf_reflection: batch.out.pdf = out(0); break;
     case Operation::evaluate_reflection:
       batch.out.value = out(0);
       if (which.sampler) batch.out.pdf = out(1);
@@ -155,9 +153,7 @@ Batch Columns::batch(const Case& which, std::size_t first) const {
       batch.out.value = out(0);
       batch.out.pdf = out(1);
       break;
-    case Operation::masking:
-      batch.out.masking = out(0);
-      break;
+    case Operation::masking: batch.out.masking = out(0); break;
   }
   return batch;
 }

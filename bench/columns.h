@@ -16,8 +16,8 @@ namespace facetwise::bench {
 
 class Columns {
  public:
-  // `malloc_lanes` of those that are placed as malloc does, at most `lanes`. ResourceExhausted if that does not fit into
-  // the memory that is free.
+  // `malloc_lanes` of those that are placed as malloc does, at most `lanes`. ResourceExhausted if that does not fit
+  // into the memory that is free.
   static absl::StatusOr<Columns> make(std::size_t lanes, std::size_t malloc_lanes = 0);
 
   std::size_t lanes() const { return kind_.lanes(); }
@@ -41,7 +41,7 @@ class Columns {
  private:
   Columns() = default;
 
-    struct Free {
+  struct Free {
     void operator()(float* p) const { ::operator delete[](p, std::align_val_t{4096}); }
   };
   static constexpr std::size_t kMallocOffset = 4;

@@ -65,9 +65,8 @@ Json to_json(const BenchLimits& limits) {
                             {"ns_per_sample", copy.ns_per_sample},
                             {"bytes_per_second", copy.bytes_per_second()}});
   for (const FmaLimit& fma : limits.fma)
-    json["fma"].push_back({{"target", text(name(fma.target))},
-                           {"threads", fma.threads},
-                           {"flops_per_second", fma.flops_per_second}});
+    json["fma"].push_back(
+        {{"target", text(name(fma.target))}, {"threads", fma.threads}, {"flops_per_second", fma.flops_per_second}});
   return json;
 }
 
@@ -91,8 +90,7 @@ Json array(const std::vector<T>& items) {
 std::string bench_json(const BenchReport& report) {
   const Json json = {
       {"version", report.version},
-      {"machine",
-       {{"cpu", report.machine.cpu}, {"cores", report.machine.cores}, {"target", report.machine.target}}},
+      {"machine", {{"cpu", report.machine.cpu}, {"cores", report.machine.cores}, {"target", report.machine.target}}},
       {"threads", report.threads},
       {"results", array(report.results)},
       {"rejections", array(report.rejections)},

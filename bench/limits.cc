@@ -39,8 +39,8 @@ struct Copy {
 
 }  // namespace
 
-std::function<void()> make_copy(const Columns& columns, int inputs, int outputs, std::size_t batch,
-                                Target target, bool all_threads, CopyOrder order) {
+std::function<void()> make_copy(const Columns& columns, int inputs, int outputs, std::size_t batch, Target target,
+                                bool all_threads, CopyOrder order) {
   Copy copy{};
   for (int k = 0; k < inputs; ++k) copy.inputs[k] = columns.input(k);
   for (int k = 0; k < outputs; ++k) copy.outputs[k] = columns.output(k);
@@ -51,9 +51,9 @@ std::function<void()> make_copy(const Columns& columns, int inputs, int outputs,
   constexpr std::size_t kUnit = 1024;
   if (!all_threads || batch < 2 * kUnit) return [copy, batch] { copy.run(0, batch); };
   return [copy, batch] {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, (batch + kUnit - 1) / kUnit, 8),
-        [&](const auto& range) { copy.run(range.begin() * kUnit, std::min(range.end() * kUnit, batch)); });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, (batch + kUnit - 1) / kUnit, 8), [&](const auto& range) {
+      copy.run(range.begin() * kUnit, std::min(range.end() * kUnit, batch));
+    });
   };
 }
 
@@ -72,8 +72,7 @@ FmaLimit measure_fma(Target target, int threads) {
       const std::uint64_t flops = multiply_add(target, kRounds, sink);
       const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
       // The sum is finite, and looking at it keeps the work.
-      rates[static_cast<std::size_t>(run * threads + thread)] =
-          sink < 1e9f ? static_cast<double>(flops) / seconds : 0;
+      rates[static_cast<std::size_t>(run * threads + thread)] = sink < 1e9f ? static_cast<double>(flops) / seconds : 0;
     }
   };
   {
@@ -83,8 +82,7 @@ FmaLimit measure_fma(Target target, int threads) {
   }
   for (int run = 0; run < kRuns; ++run) {
     double sum = 0;
-    for (int thread = 0; thread < threads; ++thread)
-      sum += rates[static_cast<std::size_t>(run * threads + thread)];
+    for (int thread = 0; thread < threads; ++thread) sum += rates[static_cast<std::size_t>(run * threads + thread)];
     limit.flops_per_second = std::max(limit.flops_per_second, sum);
   }
   return limit;

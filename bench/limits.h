@@ -17,8 +17,8 @@ enum class CopyOrder {
 
 // Reads `inputs` columns and writes `outputs` of them (no more than inputs), once, over `batch` lanes (a
 // multiple of 16), on one thread or on all of the caller's arena.
-std::function<void()> make_copy(const Columns& columns, int inputs, int outputs, std::size_t batch,
-                                Target target, bool all_threads, CopyOrder order);
+std::function<void()> make_copy(const Columns& columns, int inputs, int outputs, std::size_t batch, Target target,
+                                bool all_threads, CopyOrder order);
 
 // Peak of `threads` threads that multiply and add at once: the best of a few short runs.
 FmaLimit measure_fma(Target target, int threads);

@@ -2,8 +2,8 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bench/peak.cc"
-#include "hwy/foreach_target.h"  // IWYU pragma: keep
 #include "hwy/cache_control.h"
+#include "hwy/foreach_target.h"  // IWYU pragma: keep
 #include "hwy/highway.h"
 
 #ifndef FACETWISE_BENCH_PEAK_TABLE_
@@ -131,19 +131,15 @@ namespace {
 const PeakTable& table(Target target) {
   switch (resolve(target).value_or(Target::scalar)) {
 #if HWY_TARGETS & HWY_AVX3
-    case Target::avx3:
-      return N_AVX3::kPeakTable;
+    case Target::avx3: return N_AVX3::kPeakTable;
 #endif
 #if HWY_TARGETS & HWY_AVX2
-    case Target::avx2:
-      return N_AVX2::kPeakTable;
+    case Target::avx2: return N_AVX2::kPeakTable;
 #endif
 #if HWY_TARGETS & HWY_NEON
-    case Target::neon:
-      return N_NEON::kPeakTable;
+    case Target::neon: return N_NEON::kPeakTable;
 #endif
-    default:
-      return N_SCALAR::kPeakTable;
+    default: return N_SCALAR::kPeakTable;
   }
 }
 
@@ -153,8 +149,8 @@ std::uint64_t multiply_add(Target target, std::uint64_t rounds, float& sink) {
   return table(target).multiply_add(rounds, sink);
 }
 
-void copy_columns(Target target, const float* const* inputs, int input_count, float* const* outputs,
-                  int output_count, std::size_t begin, std::size_t end, bool streaming) {
+void copy_columns(Target target, const float* const* inputs, int input_count, float* const* outputs, int output_count,
+                  std::size_t begin, std::size_t end, bool streaming) {
   table(target).copy_columns(inputs, input_count, outputs, output_count, begin, end, streaming);
 }
 

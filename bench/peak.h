@@ -19,8 +19,8 @@ inline constexpr int kMostColumns = 16;
 // Reads lanes [begin, end) of every input column and writes every output column, one vector of each at a time
 // as the kernels do: outputs[k] = inputs[k], and the last output is the sum of the inputs that remain.
 // begin and end are multiples of 16. `streaming`: stores go past the caches, on x86; outputs begin at cache lines.
-void copy_columns(Target target, const float* const* inputs, int input_count, float* const* outputs,
-                  int output_count, std::size_t begin, std::size_t end, bool streaming);
+void copy_columns(Target target, const float* const* inputs, int input_count, float* const* outputs, int output_count,
+                  std::size_t begin, std::size_t end, bool streaming);
 
 // Reads [begin, end), multiples of 16; returns the sum.
 float read_column(Target target, const float* column, std::size_t begin, std::size_t end);

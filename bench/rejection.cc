@@ -14,8 +14,8 @@ constexpr double kPi = std::numbers::pi;
 reference::Vector incident(double theta) { return {std::sin(theta), 0, std::cos(theta)}; }
 
 // One configuration's count. `stream` sets its random numbers apart from the others'.
-absl::Status count(const std::string& experiment, const Model& model, Sampler sampler, double alpha_x,
-                   double alpha_y, double theta, std::size_t samples, std::uint32_t stream, Target target,
+absl::Status count(const std::string& experiment, const Model& model, Sampler sampler, double alpha_x, double alpha_y,
+                   double theta, std::size_t samples, std::uint32_t stream, Target target,
                    std::vector<RejectionResult>& results) {
   const reference::Vector i = incident(theta);
   Batch batch;
@@ -145,8 +145,7 @@ absl::Status count_rejections(std::size_t samples, Target target, const std::fun
     return each(experiment, {}, kGgxSamplers, alpha_x, alpha_y, theta, lanes);
   };
   for (const auto& [theta, alpha_x, alpha_y] : kTable)
-    if (const auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())
-      return status;
+    if (const auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok()) return status;
   for (const auto& [alpha_x, alpha_y] : kSweepAlpha)
     for (const double theta : kSweepTheta)
       if (const auto status = all_at("sweep", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())

@@ -20,10 +20,9 @@ double predicted_share(Sampler sampler, double alpha_x, double alpha_y, double t
 double predicted_share(const Model& model, Sampler sampler, double alpha_x, double alpha_y, double theta);
 
 // GGX's normals of density D(m) m_z have u1 = t^2 / (1 + t^2) uniform (Beckmann's 1 - exp(-t^2)) and their azimuth
-// uniform, where t is the stretched slope's length. On a ray of given azimuth the accepted normals are those below (i_z > 0) or above
-// (i_z < 0) one bound of t, so that one integral over the azimuth remains: the trapezium rule.
-double ndf_share_occluded(double alpha_x, double alpha_y, double theta,
-                          Distribution distribution = Distribution::ggx);
+// uniform, where t is the stretched slope's length. On a ray of given azimuth the accepted normals are those below (i_z
+// > 0) or above (i_z < 0) one bound of t, so that one integral over the azimuth remains: the trapezium rule.
+double ndf_share_occluded(double alpha_x, double alpha_y, double theta, Distribution distribution = Distribution::ggx);
 
 // Counts `samples` samples per configuration with in-kernel random numbers: the table of the documentation, a
 // sweep over theta and roughness, the counts of a post of 2015 (docs/benchmarks.md), and the table of Beckmann and

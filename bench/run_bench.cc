@@ -27,8 +27,7 @@ using namespace bench;
 
 absl::Status check_options(const BenchOptions& options) {
   if (!(options.min_seconds > 0 && options.min_seconds <= 10))
-    return absl::InvalidArgumentError(
-        absl::StrCat("min_seconds: ", options.min_seconds, " is not in (0, 10]"));
+    return absl::InvalidArgumentError(absl::StrCat("min_seconds: ", options.min_seconds, " is not in (0, 10]"));
   if (options.threads < 0 || options.threads > 4096)
     return absl::InvalidArgumentError(absl::StrCat("threads: ", options.threads, " is not in [0, 4096]"));
   if (!resolve(options.target)) {
@@ -39,8 +38,8 @@ absl::Status check_options(const BenchOptions& options) {
   return absl::OkStatus();
 }
 
-absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cases,
-                       const BenchCallback& progress, BenchReport& report) {
+absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cases, const BenchCallback& progress,
+                       BenchReport& report) {
   BenchProgress now{.done = 0, .total = cases.size(), .result = nullptr, .part = "limits"};
   const std::function<bool()> step = [&] { return !progress || progress(now); };
   const auto stopped = [] { return absl::CancelledError("the benchmarks were stopped"); };
@@ -50,8 +49,7 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
   if (options.limits) {
     if (!step()) return stopped();
     report.limits.fma.push_back(measure_fma(*resolve(options.target), 1));
-    if (report.threads > 1)
-      report.limits.fma.push_back(measure_fma(*resolve(options.target), report.threads));
+    if (report.threads > 1) report.limits.fma.push_back(measure_fma(*resolve(options.target), report.threads));
   }
 
   std::size_t lanes = 0, malloc_lanes = 0;
@@ -72,8 +70,7 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
     now.result = nullptr;
     return go_on;
   };
-  if (const auto status = measure_throughput(options, cases, *columns, done, report); !status.ok())
-    return status;
+  if (const auto status = measure_throughput(options, cases, *columns, done, report); !status.ok()) return status;
 
   if (targets) {
     now.part = "targets";
@@ -95,8 +92,7 @@ absl::Status run_parts(const BenchOptions& options, const std::vector<Case>& cas
 absl::StatusOr<BenchReport> run_bench(const BenchOptions& options, const BenchCallback& progress) {
   static std::mutex one_run;
   const std::unique_lock lock(one_run, std::try_to_lock);
-  if (!lock)
-    return absl::FailedPreconditionError("another benchmark is under way in this process: try again later");
+  if (!lock) return absl::FailedPreconditionError("another benchmark is under way in this process: try again later");
   if (const auto status = check_options(options); !status.ok()) return status;
   const auto cases = choose_cases(options);
   if (!cases.ok()) return cases.status();
@@ -127,8 +123,7 @@ double BenchResult::ns_per_accepted() const {
 
 std::string BenchResult::name() const {
   return fmt::format("{}/{}/{}/{}/{}{}", facetwise::name(operation), bench_name(distribution, masking, sampler),
-                     alpha_text(alpha_x, alpha_y, ","), batch, implementation,
-                     inputs == "columns" ? "" : "/" + inputs);
+                     alpha_text(alpha_x, alpha_y, ","), batch, implementation, inputs == "columns" ? "" : "/" + inputs);
 }
 
 std::string alpha_text(double alpha_x, double alpha_y, std::string_view between) {

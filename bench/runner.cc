@@ -80,8 +80,9 @@ Runner make_runner(const Case& which, const Columns& columns, Target target, Eng
     return statistics->occluded;
   };
   if (which.implementation == Implementation::remote)
-    return in_turn(std::move(batches),
-                   [operation, remote, occluded](const Batch& batch) { return occluded(remote->run(operation, batch)); });
+    return in_turn(std::move(batches), [operation, remote, occluded](const Batch& batch) {
+      return occluded(remote->run(operation, batch));
+    });
   Execution execution;
   execution.target = target;
   execution.one_lane = which.implementation == Implementation::one_lane;

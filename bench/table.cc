@@ -20,8 +20,8 @@ struct Row {
 
   bool takes(const BenchResult& r) const {
     return any->operation == r.operation && any->distribution == r.distribution && any->masking == r.masking &&
-           any->sampler == r.sampler && any->alpha_x == r.alpha_x &&
-           any->alpha_y == r.alpha_y && any->inputs == r.inputs && any->batch == r.batch;
+           any->sampler == r.sampler && any->alpha_x == r.alpha_x && any->alpha_y == r.alpha_y &&
+           any->inputs == r.inputs && any->batch == r.batch;
   }
   void set(const BenchResult& r) {
     any = &r;
@@ -67,29 +67,28 @@ void add_results(const std::vector<BenchResult>& results, Out out) {
     if (k == 0 || rows[k - 1].any->operation != any.operation || rows[k - 1].any->inputs != any.inputs) {
       fmt::format_to(out, "\n{}{}\n", name(any.operation), any.inputs == "columns" ? "" : ", " + any.inputs);
       fmt::format_to(out, "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8}{:>8}{:>8}{:>7}{:>7}\n",
-                     "sampler", "alpha", "batch", "scalar", "auto", "one-lane", "simd", "threads", "remote",
-                     "occluded", "ns/acc.", "M/s", "GB/s", "copy", "FMA");
+                     "sampler", "alpha", "batch", "scalar", "auto", "one-lane", "simd", "threads", "remote", "occluded",
+                     "ns/acc.", "M/s", "GB/s", "copy", "FMA");
     }
     // The last columns are of the fastest way on one thread.
     const BenchResult* best = row.simd ? row.simd : row.any;
-    fmt::format_to(out,
-                   "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8.3g}{:>8.0f}{:>8}{:>7}{:>7}\n",
-                   bench_name(any.distribution, any.masking, any.sampler), facetwise::alpha_text(any.alpha_x, any.alpha_y),
-                   batch_text(any.batch), time_text(row.scalar, nullptr), time_text(row.vectorised, row.scalar),
-                   time_text(row.one_lane, row.scalar),
-                   time_text(row.simd, row.scalar), time_text(row.threads, row.scalar),
-                   time_text(row.remote, row.scalar), fmt::format("{:.2f} %", 100 * best->share_occluded()),
-                   best->ns_per_accepted(), best->samples_per_second() / 1e6,
-                   best->bytes_per_sample > 0 ? fmt::format("{:.1f}", best->bytes_per_second() / 1e9) : "",
-                   percent(best->share_of_copy), percent(best->share_of_fma));
+    fmt::format_to(
+        out, "  {:26}{:>11}{:>7}{:>9}{:>15}{:>15}{:>15}{:>15}{:>14}{:>9}{:>8.3g}{:>8.0f}{:>8}{:>7}{:>7}\n",
+        bench_name(any.distribution, any.masking, any.sampler), facetwise::alpha_text(any.alpha_x, any.alpha_y),
+        batch_text(any.batch), time_text(row.scalar, nullptr), time_text(row.vectorised, row.scalar),
+        time_text(row.one_lane, row.scalar), time_text(row.simd, row.scalar), time_text(row.threads, row.scalar),
+        time_text(row.remote, row.scalar), fmt::format("{:.2f} %", 100 * best->share_occluded()),
+        best->ns_per_accepted(), best->samples_per_second() / 1e6,
+        best->bytes_per_sample > 0 ? fmt::format("{:.1f}", best->bytes_per_second() / 1e9) : "",
+        percent(best->share_of_copy), percent(best->share_of_fma));
   }
 }
 
 void add_limits(const BenchLimits& limits, Out out) {
   fmt::format_to(out, "\nLimits of this machine in this run\n");
   for (const FmaLimit& fma : limits.fma)
-    fmt::format_to(out, "  fused multiply-adds, {}, {} thread{}: {:.0f} GFLOP/s\n", name(fma.target),
-                   fma.threads, fma.threads == 1 ? "" : "s", fma.flops_per_second / 1e9);
+    fmt::format_to(out, "  fused multiply-adds, {}, {} thread{}: {:.0f} GFLOP/s\n", name(fma.target), fma.threads,
+                   fma.threads == 1 ? "" : "s", fma.flops_per_second / 1e9);
   if (limits.copy.empty()) return;
   fmt::format_to(out, "  copying the columns    in  out  batch\n");
   for (std::size_t first = 0; first < limits.copy.size();) {
@@ -108,14 +107,13 @@ void add_limits(const BenchLimits& limits, Out out) {
 }
 
 void add_targets(const std::vector<TargetResult>& targets, Out out) {
-  fmt::format_to(out, "\nPerformance to reach (ratios: medians of interleaved pairs)\n  {:54}{:>10}{:>10}\n",
-                 "", "wanted", "measured");
+  fmt::format_to(out, "\nPerformance to reach (ratios: medians of interleaved pairs)\n  {:54}{:>10}{:>10}\n", "",
+                 "wanted", "measured");
   for (const TargetResult& t : targets) {
     const auto met = t.met();
-    fmt::format_to(out, "  {:54}{:>10}{:>10}  {}\n", t.what,
-                   fmt::format("{} {:g}", t.at_least ? ">=" : "<=", t.required),
-                   t.measured ? fmt::format("{:.2f}", *t.measured) : "-",
-                   met ? (*met ? "met" : "NOT MET") : "not measured");
+    fmt::format_to(
+        out, "  {:54}{:>10}{:>10}  {}\n", t.what, fmt::format("{} {:g}", t.at_least ? ">=" : "<=", t.required),
+        t.measured ? fmt::format("{:.2f}", *t.measured) : "-", met ? (*met ? "met" : "NOT MET") : "not measured");
     if (!t.note.empty()) fmt::format_to(out, "      {}\n", t.note);
   }
 }
@@ -143,9 +141,9 @@ void add_configurations(const std::vector<const RejectionResult*>& results, Out 
       const RejectionResult& s = *results[k];
       // Shares of many samples, counts of few.
       fmt::format_to(out, "{:>18}",
-                     s.samples > 100000 ? fmt::format("{:.4f} [{:.4f}]", s.share(), s.predicted_share)
-                                        : fmt::format("{} [{:.1f}]", s.rejected,
-                                                      s.predicted_share * static_cast<double>(s.samples)));
+                     s.samples > 100000
+                         ? fmt::format("{:.4f} [{:.4f}]", s.share(), s.predicted_share)
+                         : fmt::format("{} [{:.1f}]", s.rejected, s.predicted_share * static_cast<double>(s.samples)));
     }
     fmt::format_to(out, "\n");
   }
@@ -190,9 +188,8 @@ void add_rejections(const std::vector<RejectionResult>& rejections, Out out) {
     exact_samples += r.samples;
     exact_rejected += r.rejected;
   }
-  fmt::format_to(
-      out, "  largest deviation of a count from its prediction: {:.1f} standard deviations, of {} counts\n",
-      largest, rejections.size());
+  fmt::format_to(out, "  largest deviation of a count from its prediction: {:.1f} standard deviations, of {} counts\n",
+                 largest, rejections.size());
   fmt::format_to(out, "  exact: {} of {} samples occluded\n", exact_rejected, exact_samples);
   fmt::format_to(out,
                  "\nCounts of a post of 2015 (371 with ndf, 61 with visible normals at 1.5 rad; 52 at pi/4), "
@@ -217,16 +214,15 @@ void add_rejections(const std::vector<RejectionResult>& rejections, Out out) {
 std::string bench_table(const BenchReport& report) {
   std::string text;
   const Out out = std::back_inserter(text);
-  fmt::format_to(out, "facetwise {} on {}, {} core{}, {} thread{}, target {}\n", report.version,
-                 report.machine.cpu, report.machine.cores, report.machine.cores == 1 ? "" : "s",
-                 report.threads, report.threads == 1 ? "" : "s", report.machine.target);
-  fmt::format_to(
-      out,
-      "Times are nanoseconds a sample, medians of interleaved repetitions, in brackets how many times as "
-      "fast as\n"
-      "scalar; from `occluded` on they are of simd on one thread: per accepted sample, samples and bytes a\n"
-      "second, shares of the speed of copying the same columns and of the peak of multiply-adds "
-      "(estimate).\n");
+  fmt::format_to(out, "facetwise {} on {}, {} core{}, {} thread{}, target {}\n", report.version, report.machine.cpu,
+                 report.machine.cores, report.machine.cores == 1 ? "" : "s", report.threads,
+                 report.threads == 1 ? "" : "s", report.machine.target);
+  fmt::format_to(out,
+                 "Times are nanoseconds a sample, medians of interleaved repetitions, in brackets how many times as "
+                 "fast as\n"
+                 "scalar; from `occluded` on they are of simd on one thread: per accepted sample, samples and bytes a\n"
+                 "second, shares of the speed of copying the same columns and of the peak of multiply-adds "
+                 "(estimate).\n");
   add_results(report.results, out);
   if (!report.limits.fma.empty() || !report.limits.copy.empty()) add_limits(report.limits, out);
   if (!report.rejections.empty()) add_rejections(report.rejections, out);

@@ -44,8 +44,7 @@ std::string alpha_text(Roughness alpha) { return facetwise::alpha_text(alpha.x, 
 
 class Measuring {
  public:
-  Measuring(const BenchOptions& options, Columns& columns, const std::function<bool()>& step,
-            BenchReport& report)
+  Measuring(const BenchOptions& options, Columns& columns, const std::function<bool()>& step, BenchReport& report)
       : options_(options), columns_(columns), step_(step), report_(report) {}
 
   absl::Status run() {
@@ -93,15 +92,14 @@ class Measuring {
     return status_.ok();
   }
 
-  Timed timed(const Case& which, Target target) {
-    return {which, columns_, target, options_.remote, status_};
-  }
+  Timed timed(const Case& which, Target target) { return {which, columns_, target, options_.remote, status_}; }
 
   void prepare(const Case& which) { status_.Update(columns_.prepare(which)); }
 
   static Case sampling(Sampler sampler, Implementation implementation, std::size_t batch = kBatch,
                        Roughness alpha = kMixed) {
-    return {.sampler = sampler, .alpha_x = alpha.x, .alpha_y = alpha.y, .batch = batch, .implementation = implementation};
+    return {
+        .sampler = sampler, .alpha_x = alpha.x, .alpha_y = alpha.y, .batch = batch, .implementation = implementation};
   }
 
   void over_scalar(Target target) {
@@ -163,8 +161,7 @@ class Measuring {
     Case small = large;
     small.batch = lanes;
     prepare(large);
-    const Paired pair =
-        measure_paired(timed(large, options_.target), timed(small, options_.target), kRounds, kRound);
+    const Paired pair = measure_paired(timed(large, options_.target), timed(small, options_.target), kRounds, kRound);
     const double count = static_cast<double>(lanes);
     report_.targets.push_back(
         {.what = fmt::format("cap: rate of {} lanes over that of 64 k", lanes),
@@ -221,13 +218,12 @@ class Measuring {
       std::vector<Part> parts = {{timed(large, target), static_cast<double>(large.batch)},
                                  {timed(small, target), static_cast<double>(kBatch)}};
       for (int order = 0; order < kCopyOrders; ++order)
-        parts.push_back({make_copy(columns_, large.input_columns(), large.output_columns(), kTargetLanes, target, threads,
-                                   static_cast<CopyOrder>(order)),
+        parts.push_back({make_copy(columns_, large.input_columns(), large.output_columns(), kTargetLanes, target,
+                                   threads, static_cast<CopyOrder>(order)),
                          static_cast<double>(kTargetLanes)});
       const auto copy = [](const auto& time) { return std::min({time(2), time(3), time(4)}); };
-      row.measured = in_turn(parts, [&](const auto& time) {
-        return time(0) / std::max(copies * copy(time), in_cache * time(1));
-      });
+      row.measured =
+          in_turn(parts, [&](const auto& time) { return time(0) / std::max(copies * copy(time), in_cache * time(1)); });
       const auto median = [&](std::size_t k) { return 1e9 * median_of(parts[k].times); };
       row.note = fmt::format("{:.3f} ns a sample; limit: {:g} x copying {:.3f} or {:g} x 64 k lanes {:.3f}, the longer",
                              median(0), copies, copy(median), in_cache, median(1));
@@ -299,8 +295,8 @@ class Measuring {
       const Paired pair = measure_paired(far, local, kFarRounds, 0.02);
       const double large = measure_paired(far_large, local, kFarRounds, 0.02).a;
       row.measured = kBatch / pair.a / 1e6;
-      row.note = fmt::format("batches of 64 k; of 1 M: {:.1f}; local, one thread: {:.0f}",
-                             (1 << 20) / large / 1e6, kBatch / pair.b / 1e6);
+      row.note = fmt::format("batches of 64 k; of 1 M: {:.1f}; local, one thread: {:.0f}", (1 << 20) / large / 1e6,
+                             kBatch / pair.b / 1e6);
     }
     report_.targets.push_back(row);
   }

@@ -17,9 +17,8 @@ namespace facetwise::bench {
 namespace {
 
 bool flag_is_set(const std::vector<std::string>& flags, absl::string_view name) {
-  return std::any_of(flags.begin(), flags.end(), [&](const std::string& flag) {
-    return absl::StartsWith(flag, absl::StrCat("--", name, "="));
-  });
+  return std::any_of(flags.begin(), flags.end(),
+                     [&](const std::string& flag) { return absl::StartsWith(flag, absl::StrCat("--", name, "=")); });
 }
 
 // Nanoseconds per iteration of every repetition, by benchmark name.
@@ -75,8 +74,7 @@ class Group {
         });
     registered->UseRealTime();
     const double repetitions = repetitions_;
-    if (!flag_is_set(options_.benchmark_flags, "benchmark_repetitions"))
-      registered->Repetitions(repetitions_);
+    if (!flag_is_set(options_.benchmark_flags, "benchmark_repetitions")) registered->Repetitions(repetitions_);
     if (!flag_is_set(options_.benchmark_flags, "benchmark_min_time"))
       registered->MinTime(options_.min_seconds / repetitions);
   }
@@ -95,8 +93,8 @@ class Group {
 // Copying is measured with columns that are placed kindly; of fresh ones, over all of them.
 const CopyLimit* find_copy(const BenchLimits& limits, const Case& which, int threads) {
   for (const CopyLimit& copy : limits.copy)
-    if (copy.inputs == which.input_columns() && copy.outputs == which.output_columns() &&
-        copy.batch == which.lanes() && copy.threads == threads)
+    if (copy.inputs == which.input_columns() && copy.outputs == which.output_columns() && copy.batch == which.lanes() &&
+        copy.threads == threads)
       return &copy;
   return nullptr;
 }
@@ -119,12 +117,9 @@ double copy_time(Times& times, bool all_threads) {
 
 int threads_of(Implementation implementation, int all) {
   switch (implementation) {
-    case Implementation::remote:
-      return 0;
-    case Implementation::simd_threads:
-      return all;
-    default:
-      return 1;
+    case Implementation::remote: return 0;
+    case Implementation::simd_threads: return all;
+    default: return 1;
   }
 }
 
@@ -150,11 +145,10 @@ absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
       return absl::StartsWith(flag, absl::StrCat("--", name, "="));
     });
     if (!taken)
-      return absl::InvalidArgumentError(
-          absl::StrCat("benchmark flag \"", flag,
-                       "\": of Google Benchmark's flags, those that change how a measurement runs ",
-                       "are taken: --benchmark_repetitions=N, --benchmark_min_time=SECONDS, ",
-                       "--benchmark_enable_random_interleaving=BOOL, --v=LEVEL"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "benchmark flag \"", flag, "\": of Google Benchmark's flags, those that change how a measurement runs ",
+          "are taken: --benchmark_repetitions=N, --benchmark_min_time=SECONDS, ",
+          "--benchmark_enable_random_interleaving=BOOL, --v=LEVEL"));
     storage.push_back(flag);
   }
   std::vector<char*> argv;
@@ -164,47 +158,42 @@ absl::Status set_benchmark_flags(const std::vector<std::string>& flags) {
   benchmark::Initialize(&argc, argv.data());
   // It leaves what it cannot parse.
   if (argc > 1)
-    return absl::InvalidArgumentError(
-        absl::StrCat("benchmark flag \"", argv[1], "\": not a value that fits"));
+    return absl::InvalidArgumentError(absl::StrCat("benchmark flag \"", argv[1], "\": not a value that fits"));
   return absl::OkStatus();
 }
 
 absl::Status measure_throughput(const BenchOptions& options, const std::vector<Case>& cases, Columns& columns,
                                 const std::function<bool(const BenchResult&)>& done, BenchReport& report) {
   for (auto first = cases.begin(); first != cases.end();) {
-    const auto last =
-        std::find_if_not(first, cases.end(), [&](const Case& which) { return which.comparable(*first); });
+    const auto last = std::find_if_not(first, cases.end(), [&](const Case& which) { return which.comparable(*first); });
     if (const auto status = columns.prepare(*first); !status.ok()) return status;
 
     Group group(options, first->lanes());
     std::vector<std::optional<std::uint64_t>> rejected(static_cast<std::size_t>(last - first));
     for (auto which = first; which != last; ++which) {
       std::optional<std::uint64_t>& count = rejected[static_cast<std::size_t>(which - first)];
-      group.add(
-          std::string(name(which->implementation)),
-          [once = make_runner(*which, columns, options.target, options.remote), &count]() -> absl::Status {
-            const auto occluded = once();
-            if (!occluded.ok()) return occluded.status();
-            if (!count) count = *occluded;  // of the first batch, where they differ
-            return absl::OkStatus();
-          });
+      group.add(std::string(name(which->implementation)),
+                [once = make_runner(*which, columns, options.target, options.remote), &count]() -> absl::Status {
+                  const auto occluded = once();
+                  if (!occluded.ok()) return occluded.status();
+                  if (!count) count = *occluded;  // of the first batch, where they differ
+                  return absl::OkStatus();
+                });
     }
     std::vector<bool> copies;  // of one thread, of all
     if (options.limits) {
       copies.push_back(false);
       if (report.threads > 1) copies.push_back(true);
-      std::erase_if(copies, [&](bool all) {
-        return find_copy(report.limits, *first, all ? report.threads : 1) != nullptr;
-      });
+      std::erase_if(copies,
+                    [&](bool all) { return find_copy(report.limits, *first, all ? report.threads : 1) != nullptr; });
     }
     for (const bool all : copies)
       for (const CopyOrder order : kOrders)
-        group.add(copy_name(all, order),
-                  [copy = make_copy(columns, first->input_columns(), first->output_columns(), first->lanes(),
-                                    options.target, all, order)] {
-                    copy();
-                    return absl::OkStatus();
-                  });
+        group.add(copy_name(all, order), [copy = make_copy(columns, first->input_columns(), first->output_columns(),
+                                                           first->lanes(), options.target, all, order)] {
+          copy();
+          return absl::OkStatus();
+        });
 
     Times times;
     if (const auto status = group.run(times); !status.ok()) return status;

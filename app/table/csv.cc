@@ -97,8 +97,7 @@ class CsvInput final : public InputTable {
         const std::string_view text = trim(line.substr(0, comma));
         const std::optional<float> value = parse_float(text);
         if (!value)
-          return invalid("{}, line {}, column {}: \"{}\" is not a number", path, number, names_[column],
-                         text);
+          return invalid("{}, line {}, column {}: \"{}\" is not a number", path, number, names_[column], text);
         columns_[column].push_back(*value);
       }
       line.remove_prefix(more ? comma + 1 : line.size());
@@ -128,16 +127,13 @@ class CsvOutput final : public OutputTable {
 
   absl::Status commit() override {
     fmt::memory_buffer text;
-    const auto append = [&](std::string_view piece) {
-      text.append(piece.data(), piece.data() + piece.size());
-    };
+    const auto append = [&](std::string_view piece) { text.append(piece.data(), piece.data() + piece.size()); };
     const auto end_line = [&] { text[text.size() - 1] = '\n'; };  // instead of the last comma
     for (const auto& name : names_.floats) append(name), append(",");
     for (const auto& name : names_.bytes) append(name), append(",");
     end_line();
     for (std::size_t row = 0; row < rows_; ++row) {
-      for (const auto& column : columns_)
-        fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
+      for (const auto& column : columns_) fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
       for (const auto& column : bytes_) fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
       end_line();
       if (text.size() < kPiece) continue;

@@ -66,13 +66,12 @@ class NpyInput final : public InputTable {
   absl::StatusOr<Column<float>> column(std::size_t index) override {
     const NpyField& field = header_.fields[index];
     if (!field.scalar || field.type != "<f4")
-      return invalid("{}: field {} is {}; it must be little-endian float32, '<f4' (numpy: array.astype)",
-                     path_, field.name, field.type);
+      return invalid("{}: field {} is {}; it must be little-endian float32, '<f4' (numpy: array.astype)", path_,
+                     field.name, field.type);
     const char* first = mapping_.data() + header_.data_offset + field.offset;
-    const bool aligned = reinterpret_cast<std::uintptr_t>(first) % alignof(float) == 0 &&
-                         header_.record_bytes % alignof(float) == 0;
-    if (aligned)
-      return Column<float>(reinterpret_cast<const float*>(first), header_.rows, header_.record_bytes);
+    const bool aligned =
+        reinterpret_cast<std::uintptr_t>(first) % alignof(float) == 0 && header_.record_bytes % alignof(float) == 0;
+    if (aligned) return Column<float>(reinterpret_cast<const float*>(first), header_.rows, header_.record_bytes);
     // A packed record of odd length: columns need 4-byte alignment.
     auto& copy = copies_.emplace_back(header_.rows);
     for (std::size_t row = 0; row < header_.rows; ++row)
@@ -102,8 +101,7 @@ class NpyOutput final : public OutputTable {
     return {reinterpret_cast<float*>(data_) + index, rows_, record_bytes(columns_)};
   }
   OutputColumn<std::uint8_t> byte_column(std::size_t index) override {
-    return {reinterpret_cast<std::uint8_t*>(data_) + columns_ * sizeof(float) + index, rows_,
-            record_bytes(columns_)};
+    return {reinterpret_cast<std::uint8_t*>(data_) + columns_ * sizeof(float) + index, rows_, record_bytes(columns_)};
   }
   absl::Status commit() override {
     mapping_.unmap();
@@ -166,8 +164,7 @@ absl::StatusOr<std::unique_ptr<OutputTable>> create_npy(const std::string& path,
     return invalid("{}: cannot reserve {} bytes: {}", path, size, std::strerror(error));
   Mapping mapping;
   if (!mapping.map(file->descriptor(), size, true)) return invalid("{}: {}", path, std::strerror(errno));
-  return std::make_unique<NpyOutput>(*std::move(file), std::move(mapping), header.size(),
-                                     columns.floats.size(), rows);
+  return std::make_unique<NpyOutput>(*std::move(file), std::move(mapping), header.size(), columns.floats.size(), rows);
 }
 
 }  // namespace facetwise::app

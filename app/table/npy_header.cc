@@ -119,10 +119,8 @@ std::size_t elements(const Literal& shape) {
 
 // Bytes of a value of a type such as "<f4"; nothing for Python objects and what is no type.
 std::optional<std::size_t> type_bytes(std::string_view type) {
-  if (type.size() < 3 || std::string_view("<>|=").find(type[0]) == std::string_view::npos)
-    return std::nullopt;
-  if (std::string_view("?bhilqBHILQefdgFDGSaUVMmcfiu").find(type[1]) == std::string_view::npos)
-    return std::nullopt;
+  if (type.size() < 3 || std::string_view("<>|=").find(type[0]) == std::string_view::npos) return std::nullopt;
+  if (std::string_view("?bhilqBHILQefdgFDGSaUVMmcfiu").find(type[1]) == std::string_view::npos) return std::nullopt;
   std::size_t count = 0;
   const auto [end, error] = std::from_chars(type.data() + 2, type.data() + type.size(), count);
   const std::string_view rest(end, static_cast<std::size_t>(type.data() + type.size() - end));
@@ -139,8 +137,7 @@ absl::StatusOr<std::size_t> field_bytes(const Literal& type, const std::string& 
   if (type.kind != Literal::Kind::list) return invalid("field {}: unknown type", name);
   std::size_t total = 0;
   for (const Literal& member : type.items) {
-    if (member.kind != Literal::Kind::tuple || member.items.size() < 2)
-      return invalid("field {}: unknown type", name);
+    if (member.kind != Literal::Kind::tuple || member.items.size() < 2) return invalid("field {}: unknown type", name);
     auto bytes = field_bytes(member.items[1], name);
     if (!bytes.ok()) return bytes;
     if (member.items.size() > 2) *bytes = product(*bytes, elements(member.items[2]));
@@ -157,8 +154,7 @@ absl::Status read_fields(const Literal& descr, NpyHeader& header) {
       return invalid("malformed header: a field of descr is not (name, type)");
     // A name may be a pair of a title and the name.
     const Literal& name = item.items[0].items.size() == 2 ? item.items[0].items[1] : item.items[0];
-    if (name.kind != Literal::Kind::string)
-      return invalid("malformed header: a field's name is not a string");
+    if (name.kind != Literal::Kind::string) return invalid("malformed header: a field's name is not a string");
     NpyField field{.name = name.text, .type = "a structure", .offset = header.record_bytes};
     auto bytes = field_bytes(item.items[1], field.name);
     if (!bytes.ok()) return bytes.status();
@@ -206,8 +202,8 @@ absl::StatusOr<NpyHeader> parse_npy_header(std::string_view file) {
   header.data_offset = begin + length;
   const std::size_t needed = sum(header.data_offset, product(header.rows, header.record_bytes));
   if (needed > file.size())
-    return invalid("truncated: {} records of {} bytes need {} bytes, the file has {}", header.rows,
-                   header.record_bytes, needed, file.size());
+    return invalid("truncated: {} records of {} bytes need {} bytes, the file has {}", header.rows, header.record_bytes,
+                   needed, file.size());
   return header;
 }
 

@@ -28,8 +28,8 @@ struct Sample {
 
 // Each takes the incident direction, roughness and uniform numbers as model.h says.
 inline Sample sample_normal(Sampler sampler, Vector i, float alpha_x, float alpha_y, float u1, float u2);
-inline Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, float alpha_x, float alpha_y,
-                                float u1, float u2, float u3);
+inline Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, float alpha_x, float alpha_y, float u1,
+                                float u2, float u3);
 inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, float alpha_y);
 inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
 inline float masking(Vector i, float alpha_x, float alpha_y);

@@ -14,8 +14,8 @@ inline constexpr float kPi = 3.14159265358979f;
 
 #ifdef FACETWISE_BASELINE_VECTORISED
 inline constexpr bool kVectorised = true;
-// gcc joins std::sin and std::cos of one angle to a call that has no vector function. These have one, and are kept apart
-// by -fno-builtin.
+// gcc joins std::sin and std::cos of one angle to a call that has no vector function. These have one, and are kept
+// apart by -fno-builtin.
 extern "C" float sinf(float) noexcept __attribute__((const, simd("notinbranch")));
 extern "C" float cosf(float) noexcept __attribute__((const, simd("notinbranch")));
 inline float sine(float x) { return sinf(x); }
@@ -97,8 +97,7 @@ inline Cone cone(Vector i, const Stretched& s, float ax, float ay) {
 }
 
 // N in p(o) = D(m) / (4 N).
-inline float normaliser(Sampler sampler, Vector i, const Stretched& s, float im, float mz, float ax,
-                        float ay) {
+inline float normaliser(Sampler sampler, Vector i, const Stretched& s, float im, float mz, float ax, float ay) {
   if (sampler == Sampler::ndf) return im / mz;
   if (sampler == Sampler::bounded && i.z > 0) return (bound(i, ax, ay) * i.z + s.nu) / 2;
   if (sampler == Sampler::exact && i.z > 0) return cone(i, s, ax, ay).k;
@@ -106,8 +105,7 @@ inline float normaliser(Sampler sampler, Vector i, const Stretched& s, float im,
 }
 
 // f cos(theta_o) / pdf of visible normals' reflections, for o_z > 0.
-inline float shadowing_weight(Shadowing shadowing, Vector i, const Stretched& s, Vector o, float ax,
-                              float ay) {
+inline float shadowing_weight(Shadowing shadowing, Vector i, const Stretched& s, Vector o, float ax, float ay) {
   const float x = ax * o.x, y = ay * o.y;
   const float a = x * x + y * y;
   const float t = o.z + std::sqrt(a + o.z * o.z);
@@ -175,8 +173,7 @@ struct Drawn {
   float n;
 };
 
-inline Drawn draw(Sampler sampler, Vector i, const Stretched& s, float ax, float ay, float u1, float u2,
-                  float u3) {
+inline Drawn draw(Sampler sampler, Vector i, const Stretched& s, float ax, float ay, float u1, float u2, float u3) {
   const Azimuth phi(u2);
   Vector h;
   float n = s.area;
@@ -214,8 +211,8 @@ inline Sample sample_normal(Sampler sampler, Vector i, float alpha_x, float alph
   return sample;
 }
 
-inline Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, float alpha_x, float alpha_y,
-                                float u1, float u2, float u3) {
+inline Sample sample_reflection(Sampler sampler, Shadowing shadowing, Vector i, float alpha_x, float alpha_y, float u1,
+                                float u2, float u3) {
   using namespace internal;
   const Stretched s = stretch(i, alpha_x, alpha_y);
   const Drawn drawn = draw(sampler, i, s, alpha_x, alpha_y, u1, u2, u3);
@@ -237,8 +234,7 @@ inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, 
   if (o.z <= 0 || h.z <= 0) return 0;
   const float ih = dot(h, h) / 2;
   const Stretched s = stretch(i, alpha_x, alpha_y);
-  return distribution(normalize(h), alpha_x, alpha_y) /
-         (4 * normaliser(sampler, i, s, ih, h.z, alpha_x, alpha_y));
+  return distribution(normalize(h), alpha_x, alpha_y) / (4 * normaliser(sampler, i, s, ih, h.z, alpha_x, alpha_y));
 }
 
 inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y) {
@@ -246,8 +242,8 @@ inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float 
   const Vector h = i + o;
   if (o.z <= 0 || h.z <= 0) return 0;
   const Stretched s = stretch(i, alpha_x, alpha_y);
-  return shadowing_weight(shadowing, i, s, o, alpha_x, alpha_y) *
-         distribution(normalize(h), alpha_x, alpha_y) / (4 * s.area);
+  return shadowing_weight(shadowing, i, s, o, alpha_x, alpha_y) * distribution(normalize(h), alpha_x, alpha_y) /
+         (4 * s.area);
 }
 
 inline float masking(Vector i, float alpha_x, float alpha_y) {

@@ -43,8 +43,8 @@ struct Inputs {
 };
 
 template <Model model, Sampler sampler>
-constexpr bool needs_u3 =
-    sampler == Sampler::exact || (sampler == Sampler::visible && model.masking == Masking::vcavity);
+constexpr bool needs_u3 = sampler == Sampler::exact ||
+                          (sampler == Sampler::visible && model.masking == Masking::vcavity);
 
 template <Model model, Sampler sampler>
 FACETWISE_FLATTEN std::uint64_t sample_normals(const Loop& loop) {
@@ -103,7 +103,7 @@ FACETWISE_FLATTEN std::uint64_t mask(const Loop& loop) {
   const Inputs in(loop);
   float* g1 = loop.masking_g1;
   FACETWISE_LOOP(std::size_t lane = 0; lane < in.lanes; ++lane)
-    g1[lane] = masking(model, in.i(lane), in.ax[lane], in.ay[lane]);
+  g1[lane] = masking(model, in.i(lane), in.ax[lane], in.ay[lane]);
   return 0;
 }
 

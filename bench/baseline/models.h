@@ -60,8 +60,7 @@ inline float area(Distribution which, Vector i, float ax, float ay) {
   const float s = std::sqrt(x * x + y * y);
   if (s == 0) return std::max(i.z, 0.0f);
   const float a = i.z / s;
-  if (which == Distribution::beckmann)
-    return (i.z * std::erfc(-a) + s * kInverseRootPi * std::exp(-a * a)) / 2;
+  if (which == Distribution::beckmann) return (i.z * std::erfc(-a) + s * kInverseRootPi * std::exp(-a * a)) / 2;
   const float t = 1 / (2 + a * a), root = std::sqrt(t);
   return i.z * (1 + a * root * (1 + t)) / 2 + s * t * root;
 }
@@ -138,8 +137,7 @@ inline float normaliser(Model model, Sampler sampler, Vector i, float im, float 
 
 // f cos(theta_o) = D(m) / 4 times this, for o_z > 0.
 inline float visibility(Model model, Shadowing shadowing, Vector i, Vector o, float im, float mz, float ax, float ay) {
-  if (model.masking == Masking::vcavity)
-    return std::min(cavity_masking(i, im, mz), cavity_masking(o, im, mz)) / i.z;
+  if (model.masking == Masking::vcavity) return std::min(cavity_masking(i, im, mz), cavity_masking(o, im, mz)) / i.z;
   const float area_i = area(model.distribution, i, ax, ay);
   return smith_weight(model.distribution, shadowing, area_i, i, o, ax, ay) / area_i;
 }

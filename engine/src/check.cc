@@ -73,8 +73,7 @@ template absl::Status check_output(absl::string_view, const OutputColumn<std::ui
 
 absl::Status check_active(const std::optional<std::span<const std::uint32_t>>& active, std::size_t lanes) {
   if (!active) return absl::OkStatus();
-  if (active->size() > lanes)
-    return invalid("active", absl::StrCat(active->size(), " indices for ", lanes, " lanes"));
+  if (active->size() > lanes) return invalid("active", absl::StrCat(active->size(), " indices for ", lanes, " lanes"));
   if (auto status = check_memory("active", active->data(), active->size(), 4, 4); !status.ok()) return status;
   std::uint32_t largest = 0;
   for (const std::uint32_t lane : *active) largest = lane > largest ? lane : largest;
@@ -97,9 +96,9 @@ absl::Status check_inputs(Operation operation, const Batch& batch, const BatchCo
     if (!column.present()) {
       const bool needed = read && !fields[k].otherwise && !(random && batch.generator);
       if (!needed) continue;
-      return invalid(field, random ? absl::StrCat("missing: ", view(name(batch.sampler)),
-                                                  " needs it unless a generator is given")
-                                   : absl::StrCat("missing: ", view(name(operation)), " needs it"));
+      return invalid(
+          field, random ? absl::StrCat("missing: ", view(name(batch.sampler)), " needs it unless a generator is given")
+                        : absl::StrCat("missing: ", view(name(operation)), " needs it"));
     }
     if (!known) return invalid(field, absl::StrCat(view(name(operation)), " does not read it"));
     // A u3 that the sampler does not need does no harm.
@@ -154,10 +153,8 @@ absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
       outputs[output_count++] = {&byte_fields()[k].name, memory_use(*columns.byte_out[k])};
   for (std::size_t k = 0; k < kInputs; ++k)
     if (columns.in[k]->present()) inputs[input_count++] = {&input_fields()[k].name, memory_use(*columns.in[k])};
-  if (batch.generator && batch.generator->id.present())
-    inputs[input_count++] = {&kId, memory_use(batch.generator->id)};
-  if (batch.active)
-    inputs[input_count++] = {&kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4)};
+  if (batch.generator && batch.generator->id.present()) inputs[input_count++] = {&kId, memory_use(batch.generator->id)};
+  if (batch.active) inputs[input_count++] = {&kActive, memory_use(batch.active->data(), batch.active->size(), 4, 4)};
 
   for (std::size_t k = 0; k < output_count; ++k) {
     const Use& output = outputs[k];
@@ -174,9 +171,9 @@ absl::Status check_overlap(const Batch& batch, const BatchColumns& columns) {
   return absl::OkStatus();
 }
 
-// True of nearly all calls, and then nothing is wrong with the columns: all are contiguous, of one value per lane (inputs
-// perhaps of one value for all), known to the call, aligned and apart. Decided with few branches, since every call
-// pays for it; where it is false the checks above find out what is wrong, if anything is.
+// True of nearly all calls, and then nothing is wrong with the columns: all are contiguous, of one value per lane
+// (inputs perhaps of one value for all), known to the call, aligned and apart. Decided with few branches, since every
+// call pays for it; where it is false the checks above find out what is wrong, if anything is.
 bool plainly_right(Operation operation, const Batch& batch, const PresentColumns& columns) {
   if (batch.active || batch.lanes == 0 || (batch.generator && (!samples(operation) || batch.generator->id.present())))
     return false;
@@ -189,7 +186,8 @@ bool plainly_right(Operation operation, const Batch& batch, const PresentColumns
 
   const std::size_t lanes = batch.lanes, bytes = lanes * sizeof(float);
   if (lanes > PTRDIFF_MAX / sizeof(float)) return false;
-  std::uintptr_t low[std::size_t{kInputs} + kOutputs + kByteOutputs], out[std::size_t{kOutputs} + kByteOutputs], wrong = 0;
+  std::uintptr_t low[std::size_t{kInputs} + kOutputs + kByteOutputs], out[std::size_t{kOutputs} + kByteOutputs],
+      wrong = 0;
   std::size_t low_count = 0, out_count = 0;
   const auto fits = [&](const auto& column, std::size_t width) -> std::uintptr_t {
     const std::uintptr_t data = address(column.data());

@@ -11,9 +11,9 @@
 namespace facetwise {
 namespace {
 
-// Between a column's end and the next one's begin: three pages and 19 lines. Multiples of 19 lines are at least two lines
-// apart modulo a page for 27 columns; odd multiples of a page keep apart caches that look at the next higher bits.
-// Measured: 19 lines alone, or a page and 5 lines, cost 5 to 15 %.
+// Between a column's end and the next one's begin: three pages and 19 lines. Multiples of 19 lines are at least two
+// lines apart modulo a page for 27 columns; odd multiples of a page keep apart caches that look at the next higher
+// bits. Measured: 19 lines alone, or a page and 5 lines, cost 5 to 15 %.
 constexpr std::size_t kGap = 3 * 1024 + 19 * kLine;
 
 std::size_t stride_of(std::size_t lanes) { return (lanes + kLine - 1) / kLine * kLine + kGap; }

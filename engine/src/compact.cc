@@ -30,9 +30,7 @@ absl::Status check(const Compaction& c) {
       return absl::InvalidArgumentError(absl::StrCat(name, ": overlaps ", other));
     };
     if (share_memory(use, memory_use(c.status))) return overlaps("status");
-    if (c.active &&
-        share_memory(use, memory_use(c.active->data(), c.active->size(), 4, 4)))
-      return overlaps("active");
+    if (c.active && share_memory(use, memory_use(c.active->data(), c.active->size(), 4, 4))) return overlaps("active");
     for (std::size_t j = 0; j < c.columns.size(); ++j) {
       if (share_memory(use, memory_use(c.columns[j].from))) return overlaps(field(j, "from"));
       if (j < skip && share_memory(use, memory_use(c.columns[j].to))) return overlaps(field(j, "to"));
@@ -50,7 +48,9 @@ absl::StatusOr<std::size_t> compact(const Compaction& c, const Execution& execut
   if (auto status = check(c); !status.ok()) return status;
   const std::size_t positions = c.active ? c.active->size() : c.lanes;
   const auto lane_at = [&](std::size_t position) -> std::size_t { return c.active ? (*c.active)[position] : position; };
-  const auto accepted = [&](std::size_t lane) { return c.status[lane] == static_cast<std::uint8_t>(LaneStatus::accepted); };
+  const auto accepted = [&](std::size_t lane) {
+    return c.status[lane] == static_cast<std::uint8_t>(LaneStatus::accepted);
+  };
 
   // Two passes over a fixed number of chunks: count, then write behind the chunks before.
   constexpr std::size_t kChunks = 64;

@@ -58,7 +58,8 @@ std::vector<Sampler> samplers_for(Operation operation, const Model& model, bool 
   std::vector<Sampler> samplers;
   const TargetKernels& table = any_kernels();
   for (const Sampler sampler : all_samplers())
-    if (operation != Operation::masking && find_kernel(table, operation, model, sampler, affine)) samplers.push_back(sampler);
+    if (operation != Operation::masking && find_kernel(table, operation, model, sampler, affine))
+      samplers.push_back(sampler);
   return samplers;
 }
 
@@ -135,12 +136,13 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
   const DistributionKernels& distribution = kernels_of(model.distribution);
   const bool affine = is_affine(batch);
   if (!surface_of(distribution, model.masking, false).masking)
-    return invalid("model.masking", absl::StrCat(named(model.distribution), " has no projected area in closed form, which ",
-                                                 "Smith needs; it takes vcavity, or a table of it"));
+    return invalid("model.masking",
+                   absl::StrCat(named(model.distribution), " has no projected area in closed form, which ",
+                                "Smith needs; it takes vcavity, or a table of it"));
   const bool table = model.distribution == Distribution::table;
   if (table != (model.table != nullptr))
-    return invalid("model.table", table ? "missing: the distribution `table` needs it"
-                                        : "given, but the distribution is not `table`");
+    return invalid("model.table",
+                   table ? "missing: the distribution `table` needs it" : "given, but the distribution is not `table`");
   if (scatters(operation) && model.interface != Interface::dielectric)
     return invalid("model.interface", absl::StrCat(named(operation), " needs a dielectric; this is a ",
                                                    named(model.interface), " one, which transmits nothing"));
@@ -152,7 +154,8 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
   }
   const bool skewed = model.table != nullptr && !model.table->radial();
   if (skewed && model.masking == Masking::vcavity)
-    return invalid("model.masking", "vcavity needs a density that is the same on both sides of a groove: a radial table");
+    return invalid("model.masking",
+                   "vcavity needs a density that is the same on both sides of a groove: a radial table");
   if (skewed && batch.slope_correlation.present())
     return invalid("slope_correlation", "correlated roughness needs a radial table");
   if (skewed && model.retro)
@@ -161,9 +164,12 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
     return invalid("model.retro", "needs normals that are distributed symmetrically about n: not with a mean slope");
 
   if (find_kernel(any_kernels(), operation, model, sampler_of(operation, batch), affine)) return absl::OkStatus();
-  const char* with = !affine ? "" : batch.slope_correlation.present() ? " and correlated roughness" : " and a mean slope";
-  return invalid("sampler", absl::StrCat(named(batch.sampler), " does not fit ", named(operation), " of ", model_name(model),
-                                         with, "; what does: ", names_of(samplers_for(operation, model, affine))));
+  const char* with = !affine                             ? ""
+                     : batch.slope_correlation.present() ? " and correlated roughness"
+                                                         : " and a mean slope";
+  return invalid("sampler",
+                 absl::StrCat(named(batch.sampler), " does not fit ", named(operation), " of ", model_name(model), with,
+                              "; what does: ", names_of(samplers_for(operation, model, affine))));
 }
 
 }  // namespace facetwise

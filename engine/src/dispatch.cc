@@ -9,7 +9,6 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/dispatch.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
-
 #include "hwy/highway.h"
 #include "src/distributions.h"
 #include "src/math/philox-inl.h"
@@ -28,14 +27,14 @@ extern const TargetKernels kTable;
 extern const TargetKernels kOneLaneTable;
 #define FACETWISE_ENTRY(Name) &k##Name,
 const TargetKernels kTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)},
-                            Philox<hn::ScalableTag<float>>,
-                            hn::MaxLanes(hn::ScalableTag<float>()),
-                            kStreams<hn::ScalableTag<float>>,
-                            hwy::FlushStream};
+                              Philox<hn::ScalableTag<float>>,
+                              hn::MaxLanes(hn::ScalableTag<float>()),
+                              kStreams<hn::ScalableTag<float>>,
+                              hwy::FlushStream};
 #undef FACETWISE_ENTRY
 #define FACETWISE_ENTRY(Name) &kOneLane##Name,
-const TargetKernels kOneLaneTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1, false,
-                                   hwy::FlushStream};
+const TargetKernels kOneLaneTable = {
+    {FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1, false, hwy::FlushStream};
 #undef FACETWISE_ENTRY
 
 }  // namespace HWY_NAMESPACE
@@ -99,7 +98,9 @@ const TargetKernels& kernels(Target target, bool one_lane) {
   return one_lane ? *found->one_lane : *found->table;
 }
 
-std::size_t vector_lanes(Target target) { return kernels(resolve(target).value_or(Target::scalar), false).vector_lanes; }
+std::size_t vector_lanes(Target target) {
+  return kernels(resolve(target).value_or(Target::scalar), false).vector_lanes;
+}
 
 }  // namespace facetwise
 #endif  // HWY_ONCE

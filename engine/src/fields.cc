@@ -8,8 +8,9 @@ namespace {
 
 using namespace known_to;
 
-#define FACETWISE_FIELD(Name, member, operations, otherwise) \
-  {#member, [](Batch& b) -> Column<float>& { return b.member; }, operations, otherwise, (kRandomInputs >> k##Name & 1) != 0},
+#define FACETWISE_FIELD(Name, member, operations, otherwise)                            \
+  {#member, [](Batch& b) -> Column<float>& { return b.member; }, operations, otherwise, \
+   (kRandomInputs >> k##Name & 1) != 0},
 constexpr InputField kInputFields[] = {FACETWISE_INPUT_FIELDS(FACETWISE_FIELD)};
 #undef FACETWISE_FIELD
 #define FACETWISE_FIELD(Name, member, operations) \

@@ -29,45 +29,45 @@ inline constexpr unsigned kBranch = bit(sample_scattering) | bit(evaluate_scatte
 }  // namespace known_to
 
 // X(index, member of Batch, operations that know it, what a missing column means)
-#define FACETWISE_INPUT_FIELDS(X)                         \
-  X(Ix, incident.x, kEvery, std::nullopt)                 \
-  X(Iy, incident.y, kEvery, std::nullopt)                 \
-  X(Iz, incident.z, kEvery, std::nullopt)                 \
-  X(AlphaX, alpha_x, kEvery, std::nullopt)                \
-  X(AlphaY, alpha_y, kEvery, std::nullopt)                \
-  X(MeanX, mean_slope_x, kEvery, 0.0f)                    \
-  X(MeanY, mean_slope_y, kEvery, 0.0f)                    \
-  X(Correlation, slope_correlation, kEvery, 0.0f)         \
-  X(Eta, eta, kDielectric, std::nullopt)                  \
-  X(F0, f0, kReflectance, std::nullopt)                   \
-  X(F90, f90, kReflectance, 1.0f)                         \
-  X(Ox, outgoing.x, kQuery, std::nullopt)                 \
-  X(Oy, outgoing.y, kQuery, std::nullopt)                 \
-  X(Oz, outgoing.z, kQuery, std::nullopt)                 \
-  X(U1, u1, kSample, std::nullopt)                        \
-  X(U2, u2, kSample, std::nullopt)                        \
+#define FACETWISE_INPUT_FIELDS(X)                 \
+  X(Ix, incident.x, kEvery, std::nullopt)         \
+  X(Iy, incident.y, kEvery, std::nullopt)         \
+  X(Iz, incident.z, kEvery, std::nullopt)         \
+  X(AlphaX, alpha_x, kEvery, std::nullopt)        \
+  X(AlphaY, alpha_y, kEvery, std::nullopt)        \
+  X(MeanX, mean_slope_x, kEvery, 0.0f)            \
+  X(MeanY, mean_slope_y, kEvery, 0.0f)            \
+  X(Correlation, slope_correlation, kEvery, 0.0f) \
+  X(Eta, eta, kDielectric, std::nullopt)          \
+  X(F0, f0, kReflectance, std::nullopt)           \
+  X(F90, f90, kReflectance, 1.0f)                 \
+  X(Ox, outgoing.x, kQuery, std::nullopt)         \
+  X(Oy, outgoing.y, kQuery, std::nullopt)         \
+  X(Oz, outgoing.z, kQuery, std::nullopt)         \
+  X(U1, u1, kSample, std::nullopt)                \
+  X(U2, u2, kSample, std::nullopt)                \
   X(U3, u3, kSample, std::nullopt)
 
 // X(index, member of Batch::out, operations that know it)
-#define FACETWISE_OUTPUT_FIELDS(X)                        \
-  X(Ox, outgoing.x, kDirection)                           \
-  X(Oy, outgoing.y, kDirection)                           \
-  X(Oz, outgoing.z, kDirection)                           \
-  X(Mx, normal.x, kSample)                                \
-  X(My, normal.y, kSample)                                \
-  X(Mz, normal.z, kSample)                                \
-  X(Im, incident_dot_normal, kSample)                     \
-  X(Pdf, pdf, kDensity)                                   \
-  X(Weight, weight, kDirection)                           \
-  X(Value, value, kValue)                                 \
-  X(Masking, masking, kMasking)                           \
-  X(Area, projected_area, kMasking)                       \
-  X(Share, share_unoccluded, kMasking)                    \
-  X(Branch, branch_probability, kBranch)                  \
+#define FACETWISE_OUTPUT_FIELDS(X)       \
+  X(Ox, outgoing.x, kDirection)          \
+  X(Oy, outgoing.y, kDirection)          \
+  X(Oz, outgoing.z, kDirection)          \
+  X(Mx, normal.x, kSample)               \
+  X(My, normal.y, kSample)               \
+  X(Mz, normal.z, kSample)               \
+  X(Im, incident_dot_normal, kSample)    \
+  X(Pdf, pdf, kDensity)                  \
+  X(Weight, weight, kDirection)          \
+  X(Value, value, kValue)                \
+  X(Masking, masking, kMasking)          \
+  X(Area, projected_area, kMasking)      \
+  X(Share, share_unoccluded, kMasking)   \
+  X(Branch, branch_probability, kBranch) \
   X(EtaScale, eta_scale, kScattered)
 
-#define FACETWISE_BYTE_FIELDS(X)                          \
-  X(Status, status, kEvery)                               \
+#define FACETWISE_BYTE_FIELDS(X) \
+  X(Status, status, kEvery)      \
   X(Event, event, kEvent)
 
 // kIx, ...; kOutOx, ...; kOutStatus, ...

@@ -25,13 +25,12 @@ constexpr Named<Shadowing> kShadowings[] = {{Shadowing::correlated, "correlated"
                                             {Shadowing::uncorrelated, "uncorrelated"}};
 constexpr Named<Normalisation> kNormalisations[] = {{Normalisation::unbiased, "unbiased"},
                                                     {Normalisation::biased, "biased"}};
-constexpr Named<Interface> kInterfaces[] = {{Interface::conductor, "conductor"},
-                                            {Interface::schlick, "schlick"},
-                                            {Interface::dielectric, "dielectric"}};
+constexpr Named<Interface> kInterfaces[] = {
+    {Interface::conductor, "conductor"}, {Interface::schlick, "schlick"}, {Interface::dielectric, "dielectric"}};
 constexpr Named<Transport> kTransports[] = {{Transport::radiance, "radiance"}, {Transport::importance, "importance"}};
-constexpr Named<Sampler> kSamplers[] = {{Sampler::ndf, "ndf"},         {Sampler::heitz, "heitz"},
-                                        {Sampler::cap, "cap"},         {Sampler::bounded, "bounded"},
-                                        {Sampler::exact, "exact"},     {Sampler::visible, "visible"}};
+constexpr Named<Sampler> kSamplers[] = {{Sampler::ndf, "ndf"},     {Sampler::heitz, "heitz"},
+                                        {Sampler::cap, "cap"},     {Sampler::bounded, "bounded"},
+                                        {Sampler::exact, "exact"}, {Sampler::visible, "visible"}};
 constexpr Named<LaneStatus> kStatuses[] = {{LaneStatus::accepted, "accepted"},
                                            {LaneStatus::occluded, "occluded"},
                                            {LaneStatus::smooth, "smooth"},

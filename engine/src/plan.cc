@@ -98,7 +98,8 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
     plan.buffers |= column->stride() != 1;
   }
   plan.constants.normals_alone = operation == Operation::sample_normal;
-  plan.constants.transmits = operation == Operation::sample_transmission || operation == Operation::evaluate_transmission;
+  plan.constants.transmits =
+      operation == Operation::sample_transmission || operation == Operation::evaluate_transmission;
   plan.constants.uncorrelated = model.shadowing == Shadowing::uncorrelated;
   plan.constants.biased = model.normalisation == Normalisation::biased && operation != Operation::masking;
   plan.constants.importance = model.transport == Transport::importance;

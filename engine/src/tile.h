@@ -27,12 +27,12 @@ inline constexpr std::size_t kWidest = 32;
 
 // What is the same for every tile of a call, and too small to compile kernels apart for.
 struct TileConstants {
-  unsigned wanted = 0;             // bit(OutputIndex): what is computed and stored
-  bool normals_alone = false;      // sample_normal
-  bool transmits = false;          // *_transmission, of the kernels that also serve *_scattering
-  bool uncorrelated = false;       // Shadowing::uncorrelated
-  bool biased = false;             // Normalisation::biased
-  bool importance = false;         // Transport::importance
+  unsigned wanted = 0;         // bit(OutputIndex): what is computed and stored
+  bool normals_alone = false;  // sample_normal
+  bool transmits = false;      // *_transmission, of the kernels that also serve *_scattering
+  bool uncorrelated = false;   // Shadowing::uncorrelated
+  bool biased = false;         // Normalisation::biased
+  bool importance = false;     // Transport::importance
   bool retro = false;
   Interface interface = Interface::conductor;
   const SlopeTableView* table = nullptr;

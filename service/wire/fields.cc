@@ -85,9 +85,7 @@ std::optional<Operation> operation_from(int value) { return from(value, Operatio
 std::optional<Distribution> distribution_from(int value) {
   return from(value, Distribution::table, std::optional(Distribution::ggx));
 }
-std::optional<Masking> masking_from(int value) {
-  return from(value, Masking::vcavity, std::optional(Masking::smith));
-}
+std::optional<Masking> masking_from(int value) { return from(value, Masking::vcavity, std::optional(Masking::smith)); }
 std::optional<Shadowing> shadowing_from(int value) {
   return from(value, Shadowing::uncorrelated, std::optional(Shadowing::correlated));
 }

@@ -13,8 +13,8 @@ namespace facetwise::wire {
 
 static_assert(std::endian::native == std::endian::little, "columns are sent as they lie in memory");
 
-// A column's place: a field of the message, or part 1, 2, 3 (x, y, z) of a Direction in that field. The messages' fields
-// have the names of the batch's.
+// A column's place: a field of the message, or part 1, 2, 3 (x, y, z) of a Direction in that field. The messages'
+// fields have the names of the batch's.
 struct ColumnPlace {
   std::string_view name;
   int field;

@@ -13,8 +13,7 @@ MessageReader::MessageReader(grpc::ByteBuffer& message) : slices_(&message), str
 std::optional<MessageReader::Field> MessageReader::next() {
   tag_ = stream_.ReadTag();
   if (tag_ == 0) return std::nullopt;
-  return Field{WireFormatLite::GetTagFieldNumber(tag_),
-               static_cast<int>(WireFormatLite::GetTagWireType(tag_))};
+  return Field{WireFormatLite::GetTagFieldNumber(tag_), static_cast<int>(WireFormatLite::GetTagWireType(tag_))};
 }
 
 bool MessageReader::finished() {
@@ -32,8 +31,7 @@ bool MessageReader::eight_bytes(const Field& field, std::uint64_t& value) {
 
 bool MessageReader::length(const Field& field, std::size_t& bytes) {
   std::uint32_t value = 0;
-  if (field.wire_type != WireFormatLite::WIRETYPE_LENGTH_DELIMITED || !stream_.ReadVarint32(&value))
-    return false;
+  if (field.wire_type != WireFormatLite::WIRETYPE_LENGTH_DELIMITED || !stream_.ReadVarint32(&value)) return false;
   bytes = value;
   return value <= static_cast<std::uint32_t>(stream_.BytesUntilLimit());
 }

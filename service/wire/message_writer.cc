@@ -19,8 +19,7 @@ constexpr std::size_t kAlignment = 64;
 
 }  // namespace
 
-MessageWriter::MessageWriter(std::size_t columns, std::size_t column_bytes, std::size_t other_bytes,
-                             bool aligned)
+MessageWriter::MessageWriter(std::size_t columns, std::size_t column_bytes, std::size_t other_bytes, bool aligned)
     : block_(column_bytes + other_bytes + (columns + 2) * (kLargestHeader + kAlignment)), aligned_(aligned) {
   parts_.reserve(columns + 1);
   parts_.push_back({0, 0});
@@ -73,9 +72,7 @@ char* MessageWriter::column(int field, std::size_t bytes) {
   return block_.data() + at_ - bytes;
 }
 
-std::size_t MessageWriter::field_bytes(std::size_t bytes) {
-  return 1 + CodedOutputStream::VarintSize64(bytes) + bytes;
-}
+std::size_t MessageWriter::field_bytes(std::size_t bytes) { return 1 + CodedOutputStream::VarintSize64(bytes) + bytes; }
 
 grpc::ByteBuffer MessageWriter::finish() && {
   parts_.back().end = at_;

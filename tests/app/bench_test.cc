@@ -33,9 +33,8 @@ TEST(Bench, MeasuresHereAndRemotely) {
   const Directory directory;
   const Server server(directory);
   const std::string path = directory.path("report.json");
-  const auto result =
-      facetwise({"bench", "--filter", "^sample_reflection/cap/0.3,0.3/4096/[a-z-]*$", "--min-seconds", "0.01",
-                 "--no-limits", "--remote", server.address(), "--json", path});
+  const auto result = facetwise({"bench", "--filter", "^sample_reflection/cap/0.3,0.3/4096/[a-z-]*$", "--min-seconds",
+                                 "0.01", "--no-limits", "--remote", server.address(), "--json", path});
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_NE(result.out.find("sample_reflection"), std::string::npos) << result.out;
   const Json report = Json::parse(read_file(path));
@@ -44,8 +43,7 @@ TEST(Bench, MeasuresHereAndRemotely) {
   for (const Json& row : report["results"]) implementations.push_back(row["implementation"]);
   std::sort(implementations.begin(), implementations.end());
   std::erase(implementations, "auto");  // where the compiler has vector functions for the target
-  EXPECT_EQ(implementations,
-            (std::vector<std::string>{"one-lane", "remote", "scalar", "simd", "simd-threads"}));
+  EXPECT_EQ(implementations, (std::vector<std::string>{"one-lane", "remote", "scalar", "simd", "simd-threads"}));
 }
 
 TEST(Bench, RunsOnAServersMachineIfAllowed) {
@@ -53,8 +51,7 @@ TEST(Bench, RunsOnAServersMachineIfAllowed) {
   const Server closed(directory, "closed.sock"), open(directory, "open.sock", {"--allow-benchmark"});
   const std::string path = directory.path("report.json");
   const auto run_at = [&](const Server& server, const std::string& filter) {
-    return facetwise(
-        {"bench", "--at", server.address(), "--filter", filter, "--min-seconds", "0.01", "--json", path});
+    return facetwise({"bench", "--at", server.address(), "--filter", filter, "--min-seconds", "0.01", "--json", path});
   };
   const std::string filter = "^masking/.*/0.3,0.3/256/simd$";
   const auto refused = run_at(closed, filter);
@@ -83,13 +80,8 @@ TEST(Bench, SaysWhatIsWrong) {
 }
 
 Json row(const std::string& implementation, double rate, const std::string& inputs = "columns") {
-  return {{"operation", "sample_reflection"},
-          {"sampler", "exact"},
-          {"alpha", {0.3, 0.3}},
-          {"inputs", inputs},
-          {"implementation", implementation},
-          {"batch", 65536},
-          {"samples_per_second", rate}};
+  return {{"operation", "sample_reflection"}, {"sampler", "exact"}, {"alpha", {0.3, 0.3}},       {"inputs", inputs},
+          {"implementation", implementation}, {"batch", 65536},     {"samples_per_second", rate}};
 }
 
 TEST(Summary, ShowsRatesRatiosAndCounts) {
@@ -108,8 +100,8 @@ TEST(Summary, ShowsRatesRatiosAndCounts) {
                              {"reflections", {{{"sampler", "cap"}, {"samples", 100}, {"occluded", 12}}}}};
   write_file(directory.path("r.json"), report.dump());
   write_file(directory.path("v.json"), verification.dump());
-  const std::vector<std::string> arguments = {"summary", "--report", directory.path("r.json"),
-                                              "--verification", directory.path("v.json")};
+  const std::vector<std::string> arguments = {"summary", "--report", directory.path("r.json"), "--verification",
+                                              directory.path("v.json")};
   const auto result = facetwise(arguments);
   ASSERT_EQ(result.code, 0) << result.err;
   for (const char* text : {"facetwise 1.2.3 on A CPU", "60.0 % hit", "5.0 % backfacing", "every one equal",

@@ -26,8 +26,7 @@ pid_t start(const std::vector<std::string>& arguments, const std::string& in, co
   argv.push_back(nullptr);
   const pid_t process = ::fork();
   if (process != 0) return process;
-  const int streams[] = {::open(in.c_str(), O_RDONLY),
-                         ::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600),
+  const int streams[] = {::open(in.c_str(), O_RDONLY), ::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600),
                          ::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600)};
   for (int k = 0; k < 3; ++k) ::dup2(streams[k], k);
   ::execv(argv[0], argv.data());
@@ -70,8 +69,7 @@ Result facetwise(const std::vector<std::string>& arguments, const std::string& i
   const Directory directory;
   write_file(directory.path("in"), input);
   Result result;
-  result.code =
-      wait_for(start(arguments, directory.path("in"), directory.path("out"), directory.path("err")));
+  result.code = wait_for(start(arguments, directory.path("in"), directory.path("out"), directory.path("err")));
   result.out = read_file(directory.path("out"));
   result.err = read_file(directory.path("err"));
   return result;

@@ -24,8 +24,7 @@ void expect_failure(std::vector<std::string> arguments, const std::string& input
 
 TEST(Errors, Columns) {
   expect_failure({"sample"}, "ix,iy,iz,alpha_x,alpha_y\n", "standard input: no column u1 (or give --seed");
-  expect_failure({"sample"}, "ix,iy,iz,alpha_x,alpha_y,u1,u2\n",
-                 "standard input: no column u3 (or give --seed");
+  expect_failure({"sample"}, "ix,iy,iz,alpha_x,alpha_y,u1,u2\n", "standard input: no column u3 (or give --seed");
   expect_failure({"sample", "--seed", "1"}, "ix,iy,iz,alpha_x\n",
                  "standard input: no column alpha_y (or give --alpha)");
   expect_failure({"sample", "--seed", "1", "--alpha", "1"}, "ix,iz\n", "standard input: no column iy");
@@ -58,23 +57,21 @@ TEST(Errors, NpyFiles) {
                         "'shape': (2,), }",
                     std::string(2 * (8 + bytes), '\0'));
   };
-  expect(with_type("<f8", 8),
-         "field iy is <f8; it must be little-endian float32, '<f4' (numpy: array.astype)");
+  expect(with_type("<f8", 8), "field iy is <f8; it must be little-endian float32, '<f4' (numpy: array.astype)");
   expect(with_type(">f4", 4), "field iy is >f4; it must be");
   expect(with_type("<i4", 4), "field iy is <i4; it must be");
   expect(with_type("<f4", 3), "truncated: 2 records of 12 bytes need");
   expect("", "empty");
   expect("ix,iy,iz\n", "not a .npy file");
   std::filesystem::remove(in);
-  expect_failure({"sample", "--seed", "1", "--alpha", "1", "--input", in}, "",
-                 in + ": No such file or directory");
+  expect_failure({"sample", "--seed", "1", "--alpha", "1", "--input", in}, "", in + ": No such file or directory");
   expect_failure({"sample", "--seed", "1", "--alpha", "1", "--input", directory.path("in.txt")}, "",
                  "in.txt: a file is named .csv or .npy");
 }
 
 TEST(Errors, Calls) {
-  expect_failure({"sample", "--normals", "--sampler", "bounded", "--seed", "1", "--alpha", "1"},
-                 "ix,iy,iz\n0,0,1\n", "sampler: bounded does not fit sample_normal");
+  expect_failure({"sample", "--normals", "--sampler", "bounded", "--seed", "1", "--alpha", "1"}, "ix,iy,iz\n0,0,1\n",
+                 "sampler: bounded does not fit sample_normal");
 }
 
 TEST(Errors, Servers) {
@@ -84,8 +81,7 @@ TEST(Errors, Servers) {
 }
 
 TEST(Errors, CommandLine) {
-  expect_failure({"sample", "--sampler", "best"}, "", "\"best\" is not one of ndf|heitz|cap|bounded|exact",
-                 2);
+  expect_failure({"sample", "--sampler", "best"}, "", "\"best\" is not one of ndf|heitz|cap|bounded|exact", 2);
   expect_failure({"sample", "--seed", "one"}, "", "--seed", 2);
   expect_failure({"sample", "--alpha", "1", "2", "3"}, "", "3", 2);
   expect_failure({"sample", "--first-id", "1"}, "", "--first-id requires --seed", 2);

@@ -26,11 +26,7 @@ std::vector<Case> cases() {
   const std::vector<std::string> reflection = {"ox", "oy", "oz", "mx", "my", "mz", "pdf", "weight"};
   return {
       {"exact", {"sample"}, Operation::sample_reflection, Sampler::exact, reflection},
-      {"bounded",
-       {"sample", "--sampler", "bounded"},
-       Operation::sample_reflection,
-       Sampler::bounded,
-       reflection},
+      {"bounded", {"sample", "--sampler", "bounded"}, Operation::sample_reflection, Sampler::bounded, reflection},
       {"visible", {"sample", "--sampler", "visible"}, Operation::sample_reflection, Sampler::cap, reflection},
       {"ndf", {"sample", "--sampler", "ndf"}, Operation::sample_reflection, Sampler::ndf, reflection},
       {"normals", {"sample", "--normals"}, Operation::sample_normal, Sampler::cap, {"mx", "my", "mz", "pdf"}},
@@ -76,8 +72,7 @@ void expect_same_bits(const Output& a, const Output& b) {
   for (std::size_t c = 0; c < a.names.size(); ++c) {
     ASSERT_EQ(a.columns[c].size(), b.columns[c].size());
     for (std::size_t row = 0; row < a.columns[c].size(); ++row)
-      ASSERT_EQ(std::bit_cast<std::uint32_t>(a.columns[c][row]),
-                std::bit_cast<std::uint32_t>(b.columns[c][row]))
+      ASSERT_EQ(std::bit_cast<std::uint32_t>(a.columns[c][row]), std::bit_cast<std::uint32_t>(b.columns[c][row]))
           << a.names[c] << " in row " << row << ": " << a.columns[c][row] << " and " << b.columns[c][row];
   }
 }
@@ -98,8 +93,8 @@ TEST_P(FileVerbs, CsvAndNpyHoldWhatTheLibraryComputes) {
   for (const std::string in : {"in.csv", "in.npy"})
     for (const std::string out : {"out.csv", "out.npy"}) {
       SCOPED_TRACE(in + " to " + out);
-      const auto result = facetwise(
-          plus(GetParam().arguments, {"--input", directory.path(in), "--output", directory.path(out)}));
+      const auto result =
+          facetwise(plus(GetParam().arguments, {"--input", directory.path(in), "--output", directory.path(out)}));
       ASSERT_EQ(result.code, 0) << result.err;
       EXPECT_EQ(result.out, "");
       expect_same_bits(read_output(directory.path(out)), expected);
@@ -112,8 +107,8 @@ TEST_P(FileVerbs, ServersGiveTheSameFiles) {
   const Server one(directory, "one.sock"), two(directory, "two.sock");
   write_file(directory.path("in.npy"), lanes.npy());
   const auto with = [&](const std::string& out, const std::vector<std::string>& more) {
-    const auto result = facetwise(plus(plus(GetParam().arguments, more), {"--input", directory.path("in.npy"),
-                                                                          "--output", directory.path(out)}));
+    const auto result = facetwise(
+        plus(plus(GetParam().arguments, more), {"--input", directory.path("in.npy"), "--output", directory.path(out)}));
     EXPECT_EQ(result.code, 0) << result.err;
     return read_file(directory.path(out));
   };
@@ -196,8 +191,7 @@ TEST(Sample, EmptyAndSingleRowTables) {
     const std::string out = directory.path("out." + extension);
     ASSERT_EQ(facetwise({"sample", "--alpha", "1", "--seed", "1", "--output", out}, "ix,iy,iz\n").code, 0);
     EXPECT_EQ(read_output(out)["status"].size(), 0u);
-    ASSERT_EQ(facetwise({"sample", "--alpha", "1", "--seed", "1", "--output", out}, "ix,iy,iz\n0,0,1\n").code,
-              0);
+    ASSERT_EQ(facetwise({"sample", "--alpha", "1", "--seed", "1", "--output", out}, "ix,iy,iz\n0,0,1\n").code, 0);
     EXPECT_EQ(read_output(out)["status"].size(), 1u);
   }
 }
@@ -207,8 +201,7 @@ TEST(Sample, BadLanesAreCountedNotErrors) {
       "ix,iy,iz,alpha_x,alpha_y,pdf\n0,0,1,.5,.5,0\nnan,0,1,.5,.5,0\n0,0,2,.5,.5,0\n0,0,1,5e-5,.5,0\n";
   const auto text = facetwise({"sample", "--seed", "1"}, lanes);
   ASSERT_EQ(text.code, 0);
-  EXPECT_NE(text.err.find("4 lanes: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos)
-      << text.err;
+  EXPECT_NE(text.err.find("4 lanes: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos) << text.err;
   EXPECT_NE(text.err.find("columns not read: pdf"), std::string::npos) << text.err;
   const auto json = facetwise({"sample", "--seed", "1", "--json"}, lanes);
   EXPECT_EQ(json.out, text.out);
@@ -225,8 +218,7 @@ TEST(Sample, AFileMayReplaceItsInput) {
   const Directory directory;
   const std::string path = directory.path("t.npy");
   write_file(path, lanes.npy());
-  const Output expected =
-      expected_output(cases().front(), lanes.batch(Operation::sample_reflection, Sampler::exact));
+  const Output expected = expected_output(cases().front(), lanes.batch(Operation::sample_reflection, Sampler::exact));
   ASSERT_EQ(facetwise({"sample", "--input", path, "--output", path}).code, 0);
   expect_same_bits(read_output(path), expected);
 }

@@ -88,8 +88,7 @@ Output read_output(const std::string& path) {
   Output output;
   if (bytes.substr(0, 6) == "\x93NUMPY") {
     // Float fields, then status and three bytes of padding.
-    const std::size_t begin =
-        10 + static_cast<std::uint8_t>(bytes[8]) + 256 * static_cast<std::uint8_t>(bytes[9]);
+    const std::size_t begin = 10 + static_cast<std::uint8_t>(bytes[8]) + 256 * static_cast<std::uint8_t>(bytes[9]);
     const std::string header = bytes.substr(0, begin);
     EXPECT_EQ(begin % 64, 0u);
     EXPECT_NE(header.find("('status', '|u1'), ('', '|V3')]"), std::string::npos) << header;

@@ -12,8 +12,7 @@ namespace facetwise::test {
 // Directions, roughness and random numbers, among them backfacing and invalid lanes.
 struct Lanes {
   // ix iy iz alpha_x alpha_y u1 u2 u3 ox oy oz
-  static constexpr const char* kNames[] = {"ix", "iy", "iz", "alpha_x", "alpha_y", "u1",
-                                           "u2", "u3", "ox", "oy",      "oz"};
+  static constexpr const char* kNames[] = {"ix", "iy", "iz", "alpha_x", "alpha_y", "u1", "u2", "u3", "ox", "oy", "oz"};
   static constexpr std::size_t kColumns = 11;
   std::vector<float> columns[kColumns];
 

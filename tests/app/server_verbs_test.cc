@@ -12,8 +12,7 @@ namespace {
 TEST(Help, EveryVerbExplainsItselfWithAnExample) {
   const auto all = facetwise({"--help"});
   ASSERT_EQ(all.code, 0);
-  for (const std::string verb :
-       {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info"}) {
+  for (const std::string verb : {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info"}) {
     EXPECT_NE(all.out.find("\n  " + verb + " "), std::string::npos) << verb;
     const auto help = facetwise({verb, "--help"});
     EXPECT_EQ(help.code, 0);
@@ -80,8 +79,7 @@ TEST(Serve, SaysWhatItCannotDo) {
   const Server server(directory, "s.sock");
   expect({"serve", "--listen", server.address()}, 1, directory.path("s.sock"));
   expect({"serve", "--listen", "nowhere"}, 1, "nowhere");
-  expect({"serve", "--listen", "unix:" + directory.path("t.sock"), "--unix-mode", "8"}, 2,
-         "\"8\" is not a mode");
+  expect({"serve", "--listen", "unix:" + directory.path("t.sock"), "--unix-mode", "8"}, 2, "\"8\" is not a mode");
   expect({"serve", "--listen", "unix:" + directory.path("t.sock"), "--threads", "0"}, 2, "--threads");
 }
 

@@ -169,8 +169,7 @@ TEST(Npy, ReadsRecordsOfOddLength) {
   }
   write_file(
       directory.path("t.npy"),
-      npy_file("{'descr': [('status', '|u1'), ('ix', '<f4')], 'fortran_order': False, 'shape': (7,), }",
-               records));
+      npy_file("{'descr': [('status', '|u1'), ('ix', '<f4')], 'fortran_order': False, 'shape': (7,), }", records));
   const auto table = read_table(directory.path("t.npy"));
   ASSERT_TRUE(table.ok()) << table.status();
   const auto x = *(*table)->column(1);
@@ -196,25 +195,21 @@ TEST(Npy, MalformedFilesAreErrors) {
   const std::string file = npy_file(good, std::string(64, '\0'));
   for (std::size_t size = 6; size < file.size(); ++size)
     EXPECT_EQ(error(file.substr(0, size)).substr(0, 9), "truncated") << size;
-  EXPECT_EQ(with("{'descr': '<f4', 'fortran_order': False, 'shape': (16,), }").substr(0, 22),
-            "not a structured array");
+  EXPECT_EQ(with("{'descr': '<f4', 'fortran_order': False, 'shape': (16,), }").substr(0, 22), "not a structured array");
   EXPECT_EQ(with("{'descr': [('ix', '<f4')], 'fortran_order': False, 'shape': (4, 4), }").substr(0, 24),
             "an array of 2 dimensions");
   EXPECT_EQ(with("{'descr': [('ix', '<f4')], 'fortran_order': False, 'shape': (), }").substr(0, 24),
             "an array of 0 dimensions");
   EXPECT_EQ(with("{'descr': [('ix', '|O')], 'shape': (16,)}"), "field ix: unknown type \"|O\"");
   EXPECT_EQ(with("{'descr': [('ix', '<f4'), ('ix', '<f4')], 'shape': (1,)}"), "field ix twice");
-  EXPECT_EQ(with("{'descr': [('ix',)], 'shape': (1,)}"),
-            "malformed header: a field of descr is not (name, type)");
+  EXPECT_EQ(with("{'descr': [('ix',)], 'shape': (1,)}"), "malformed header: a field of descr is not (name, type)");
   // Sizes that overflow are truncations, not small numbers.
   EXPECT_EQ(with("{'descr': [('ix', '<f4')], 'shape': (4611686018427387905,)}").substr(0, 9), "truncated");
-  EXPECT_EQ(with("{'descr': [('v', '<f4', (4611686018427387905,))], 'shape': (1,)}").substr(0, 9),
-            "truncated");
+  EXPECT_EQ(with("{'descr': [('v', '<f4', (4611686018427387905,))], 'shape': (1,)}").substr(0, 9), "truncated");
   for (const char* header :
        {"", "{", "[]", "{'descr'}", "{'descr': [('ix', '<f4')]}", "{'shape': (1,)}",
         "{'descr': [('ix', '<f4')], 'shape': 1}", "{'descr': [('ix', '<f4')], 'shape': (-1,)}",
-        "{'descr': [('ix', '<f4')], 'shape': (1,)} x", "{'descr: 1}",
-        "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["})
+        "{'descr': [('ix', '<f4')], 'shape': (1,)} x", "{'descr: 1}", "[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[["})
     EXPECT_EQ(with(header), "malformed header: no descr and shape in it") << header;
 }
 

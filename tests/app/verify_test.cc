@@ -40,15 +40,12 @@ class LyingEngine final : public Engine {
       }
     auto statistics = facetwise::run(operation, copy);
     if (!now) return statistics;
-    if (lie_ == Lie::bit)
-      chosen[1234] = std::bit_cast<float>(std::bit_cast<std::uint32_t>(chosen[1234]) ^ 1u);
+    if (lie_ == Lie::bit) chosen[1234] = std::bit_cast<float>(std::bit_cast<std::uint32_t>(chosen[1234]) ^ 1u);
     if (lie_ == Lie::status) copy.out.status[kLanes - 1] ^= 1;
     if (lie_ == Lie::statistics) ++statistics->occluded;
     return statistics;
   }
-  absl::StatusOr<std::size_t> compact(const Compaction& compaction) override {
-    return facetwise::compact(compaction);
-  }
+  absl::StatusOr<std::size_t> compact(const Compaction& compaction) override { return facetwise::compact(compaction); }
 
  private:
   Lie lie_;
@@ -104,9 +101,8 @@ TEST(VerifyCases, CoverEverySamplerAndOperation) {
                             }),
               2);
   for (const Operation operation : all_operations())
-    EXPECT_TRUE(std::any_of(cases.begin(), cases.end(), [&](const VerifyCase& c) {
-      return c.operation == operation;
-    })) << name(operation);
+    EXPECT_TRUE(std::any_of(cases.begin(), cases.end(), [&](const VerifyCase& c) { return c.operation == operation; }))
+        << name(operation);
   for (const Sampler sampler : all_samplers()) {
     const Sampler one[] = {sampler};
     for (const VerifyCase& c : verify_cases(one)) EXPECT_EQ(c.sampler, sampler);
@@ -138,9 +134,7 @@ TEST(Scene, LanesAreWhatTheComparisonNeeds) {
   EXPECT_GT(smooth, 1e-3f);
 }
 
-TEST(Scene, ErrorsNameTheFile) {
-  EXPECT_EQ(message(scene::load_mesh("/none.glb").status()).find("/none.glb: "), 0u);
-}
+TEST(Scene, ErrorsNameTheFile) { EXPECT_EQ(message(scene::load_mesh("/none.glb").status()).find("/none.glb: "), 0u); }
 
 }  // namespace
 }  // namespace facetwise::app

@@ -27,8 +27,8 @@ TEST_P(Baseline, AgreesWithTheReference) {
     const reference::Vector i = {f(kIx), f(kIy), f(kIz)}, out = {f(kOx), f(kOy), f(kOz)};
     const baseline::Vector fi = {f(kIx), f(kIy), f(kIz)}, fo = {f(kOx), f(kOy), f(kOz)};
     const auto truth = reference::sample_reflection({}, GetParam(), alpha, i, f(kU1), f(kU2), f(kU3));
-    const auto sample = baseline::sample_reflection(GetParam(), Shadowing::correlated, fi, f(kAlphaX),
-                                                    f(kAlphaY), f(kU1), f(kU2), f(kU3));
+    const auto sample = baseline::sample_reflection(GetParam(), Shadowing::correlated, fi, f(kAlphaX), f(kAlphaY),
+                                                    f(kU1), f(kU2), f(kU3));
     if (sample.accepted != (truth.status == LaneStatus::accepted)) {
       ++differs;
     } else {
@@ -46,8 +46,7 @@ TEST_P(Baseline, AgreesWithTheReference) {
     if (expected > 0) {
       const float answer = baseline::pdf_reflection(GetParam(), fi, fo, f(kAlphaX), f(kAlphaY));
       query.push_back(std::abs(answer / expected - 1));
-      const float light =
-          baseline::evaluate_reflection(Shadowing::correlated, fi, fo, f(kAlphaX), f(kAlphaY));
+      const float light = baseline::evaluate_reflection(Shadowing::correlated, fi, fo, f(kAlphaX), f(kAlphaY));
       value.push_back(std::abs(light / reference::evaluate_reflection({}, alpha, i, out) - 1));
     }
   }

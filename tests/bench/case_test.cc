@@ -15,8 +15,7 @@ std::set<std::string> names(const BenchOptions& options) {
   const auto cases = choose_cases(options);
   EXPECT_TRUE(cases.ok()) << cases.status();
   std::set<std::string> names;
-  for (const Case& which : *cases)
-    EXPECT_TRUE(names.insert(describe(which).name()).second) << describe(which).name();
+  for (const Case& which : *cases) EXPECT_TRUE(names.insert(describe(which).name()).second) << describe(which).name();
   return names;
 }
 
@@ -32,9 +31,9 @@ TEST_F(Cases, FullHasEveryCombination) {
   const auto all = names(options_);
   for (const char* operation :
        {"sample_normal/ndf", "sample_normal/heitz", "sample_normal/cap", "sample_reflection/ndf",
-        "sample_reflection/heitz", "sample_reflection/cap", "sample_reflection/bounded",
-        "sample_reflection/exact", "pdf_reflection/ndf", "pdf_reflection/exact", "evaluate_reflection/none",
-        "evaluate_reflection/cap", "evaluate_reflection/exact", "masking/none"})
+        "sample_reflection/heitz", "sample_reflection/cap", "sample_reflection/bounded", "sample_reflection/exact",
+        "pdf_reflection/ndf", "pdf_reflection/exact", "evaluate_reflection/none", "evaluate_reflection/cap",
+        "evaluate_reflection/exact", "masking/none"})
     for (const char* alpha : {"mixed", "0.01,0.01", "0.3,0.3", "1,1", "0.8,0.1"})
       for (const char* batch : {"256", "4096", "65536", "1048576", "16777216"})
         for (const char* implementation : {"scalar", "one-lane", "simd", "simd-threads", "remote"}) {
@@ -110,8 +109,7 @@ TEST(Case, BytesAreThoseOfTheColumns) {
   EXPECT_EQ(describe(which).bytes_per_sample, 4.0 * (3 + 3 + 4));
   EXPECT_EQ(describe({.operation = Operation::evaluate_reflection, .sampler = Sampler::exact}).bytes_per_sample,
             4.0 * (3 + 2 + 3 + 2));
-  EXPECT_EQ(describe({.operation = Operation::masking, .sampler = std::nullopt}).bytes_per_sample,
-            4.0 * (3 + 2 + 1));
+  EXPECT_EQ(describe({.operation = Operation::masking, .sampler = std::nullopt}).bytes_per_sample, 4.0 * (3 + 2 + 1));
 }
 
 }  // namespace

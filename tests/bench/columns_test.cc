@@ -40,8 +40,8 @@ TEST(Columns, OthersAreWhereMallocPutsThem) {
   which.inputs = Inputs::malloc_placed;
   ASSERT_TRUE(columns->prepare(which).ok());
   const Batch placed = columns->batch(which);
-  for (const auto& [a, b] : {std::pair{kind.incident.x, placed.incident.x}, {kind.alpha_y, placed.alpha_y},
-                             {kind.u3, placed.u3}}) {
+  for (const auto& [a, b] :
+       {std::pair{kind.incident.x, placed.incident.x}, {kind.alpha_y, placed.alpha_y}, {kind.u3, placed.u3}}) {
     EXPECT_EQ(place(b.data()), 16u);
     for (std::size_t lane = 0; lane < kLanes; ++lane) ASSERT_EQ(a[lane], b[lane]);
   }

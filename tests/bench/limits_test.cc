@@ -55,8 +55,7 @@ TEST(Copy, ReadsAndWritesTheColumns) {
               float expected = columns->input(k)[lane];
               if (sum)
                 for (int j = outputs; j < inputs; ++j) expected += columns->input(j)[lane];
-              ASSERT_NEAR(columns->output(k)[lane], expected, 1e-5f)
-                  << inputs << " " << outputs << " " << lane;
+              ASSERT_NEAR(columns->output(k)[lane], expected, 1e-5f) << inputs << " " << outputs << " " << lane;
             }
             if (batch < 4096) {
               EXPECT_EQ(columns->output(k)[batch], -7.0f);

@@ -24,8 +24,8 @@ TEST(Rejections, CountsMeetPredictions) {
   int random = 0;
   for (const RejectionResult& r : results) {
     EXPECT_LT(std::abs(r.deviations()), 5)
-        << r.sampler << " " << r.theta_degrees << " " << r.alpha_x << " " << r.alpha_y << ": " << r.rejected
-        << " of " << r.samples << ", " << r.predicted_share;
+        << r.sampler << " " << r.theta_degrees << " " << r.alpha_x << " " << r.alpha_y << ": " << r.rejected << " of "
+        << r.samples << ", " << r.predicted_share;
     if (r.sampler == "exact") {
       EXPECT_EQ(r.rejected, 0u);
       EXPECT_EQ(r.predicted_share, 0);
@@ -65,15 +65,14 @@ TEST(Rejections, NdfQuadratureIsTheDefinition) {
     double theta, alpha_x, alpha_y;
   };
   constexpr int kGrid = 1000;
-  for (const Row& row :
-       {Row{0, .7, .7}, Row{50, .4, .9}, Row{85, .2, .2}, Row{100, .3, .3}, Row{140, 1, .5}}) {
+  for (const Row& row : {Row{0, .7, .7}, Row{50, .4, .9}, Row{85, .2, .2}, Row{100, .3, .3}, Row{140, 1, .5}}) {
     const double theta = row.theta * kDegree;
     const reference::Vector i{std::sin(theta), 0, std::cos(theta)};
     int occluded = 0;
     for (int a = 0; a < kGrid; ++a)
       for (int b = 0; b < kGrid; ++b)
-        occluded += reference::sample_reflection({}, Sampler::ndf, {row.alpha_x, row.alpha_y}, i,
-                                                 (a + .5) / kGrid, (b + .5) / kGrid, 0)
+        occluded += reference::sample_reflection({}, Sampler::ndf, {row.alpha_x, row.alpha_y}, i, (a + .5) / kGrid,
+                                                 (b + .5) / kGrid, 0)
                         .status == LaneStatus::occluded;
     EXPECT_NEAR(ndf_share_occluded(row.alpha_x, row.alpha_y, theta), occluded / 1e6, 1e-3) << row.theta;
   }

@@ -15,8 +15,7 @@ using Json = nlohmann::json;
 
 // Every number is finite (JSON has no others, so that they would be null) and no field is null, but for those
 // named.
-void expect_no_null(const Json& json, const std::set<std::string>& may_be_null,
-                    const std::string& path = "") {
+void expect_no_null(const Json& json, const std::set<std::string>& may_be_null, const std::string& path = "") {
   if (json.is_structured()) {
     for (const auto& [key, value] : json.items())
       if (!may_be_null.contains(key)) expect_no_null(value, may_be_null, path + "/" + key);
@@ -62,8 +61,7 @@ TEST(Report, JsonOfARunFitsTheSchema) {
     EXPECT_GT(copy.at("bytes_per_second").get<double>(), 1e6);
   }
   ASSERT_FALSE(json.at("limits").at("fma").empty());
-  for (const Json& fma : json.at("limits").at("fma"))
-    EXPECT_GT(fma.at("flops_per_second").get<double>(), 1e8);
+  for (const Json& fma : json.at("limits").at("fma")) EXPECT_GT(fma.at("flops_per_second").get<double>(), 1e8);
   EXPECT_TRUE(json.at("rejections").is_array());
   EXPECT_TRUE(json.at("targets").is_array());
   expect_no_null(json, {});
@@ -125,9 +123,9 @@ TEST(Report, JsonSaysWhatWasNotMeasured) {
 TEST(Report, TableHasRatiosAndShares) {
   const std::string table = bench_table(written_report());
   for (const char* expected :
-       {"facetwise 1.2.3 on a cpu, 4 cores, 4 threads, target avx2", "sample_reflection", "0.3, 0.3", "64 k",
-        "2 (12x)", "20 (1.2x)", "25.00 %", "50 %", "25 %", "100 GFLOP/s", "44.0 GB/s", "0.1950 [0.1951]",
-        ">= 13", "14.50  met", "<= 1.4", "1.50  NOT MET", "-  not measured", "a note", "no server was given"})
+       {"facetwise 1.2.3 on a cpu, 4 cores, 4 threads, target avx2", "sample_reflection", "0.3, 0.3", "64 k", "2 (12x)",
+        "20 (1.2x)", "25.00 %", "50 %", "25 %", "100 GFLOP/s", "44.0 GB/s", "0.1950 [0.1951]", ">= 13", "14.50  met",
+        "<= 1.4", "1.50  NOT MET", "-  not measured", "a note", "no server was given"})
     EXPECT_NE(table.find(expected), std::string::npos) << expected << "\n" << table;
   // Nothing but the head where nothing was done.
   EXPECT_EQ(bench_table(BenchReport{}).find("Performance to reach"), std::string::npos);

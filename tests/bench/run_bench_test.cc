@@ -65,8 +65,7 @@ TEST(RunBench, MeasuresWhatItIsAskedFor) {
   auto& cap = rejected["cap"];
   EXPECT_GT(cap["simd"], 400u);
   EXPECT_LT(cap["simd"], 900u);
-  for (const char* implementation : {"one-lane", "simd-threads", "remote"})
-    EXPECT_EQ(cap[implementation], cap["simd"]);
+  for (const char* implementation : {"one-lane", "simd-threads", "remote"}) EXPECT_EQ(cap[implementation], cap["simd"]);
   EXPECT_NEAR(static_cast<double>(cap["scalar"]), static_cast<double>(cap["simd"]), 3);
   if (has_auto) {
     EXPECT_NEAR(static_cast<double>(cap["auto"]), static_cast<double>(cap["simd"]), 3);
@@ -156,8 +155,7 @@ TEST(RunBench, TakesGoogleBenchmarksFlags) {
 TEST(RunBench, StopsAndRunsAgain) {
   const auto options = small_run("sample_reflection/.*/0.3,0.3/256/simd$");
   int results = 0;
-  const auto stopped =
-      run_bench(options, [&](const BenchProgress& p) { return p.result == nullptr || ++results < 2; });
+  const auto stopped = run_bench(options, [&](const BenchProgress& p) { return p.result == nullptr || ++results < 2; });
   EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(results, 2);
   const auto report = run_bench(options);

@@ -47,9 +47,8 @@ void expect_same_lane(const Call& call, const Answer& expected, std::size_t expe
     if (!writes(call, output_fields()[k])) continue;
     const float a = expected.out[k][expected_lane], b = got.out[k][got_lane];
     if (bits(a) == bits(b)) continue;
-    ADD_FAILURE() << call_name(call) << ": " << output_fields()[k].name << " is " << with_bits(b)
-                  << " in lane " << got_lane << ", " << with_bits(a) << " is expected (lane " << expected_lane
-                  << ")";
+    ADD_FAILURE() << call_name(call) << ": " << output_fields()[k].name << " is " << with_bits(b) << " in lane "
+                  << got_lane << ", " << with_bits(a) << " is expected (lane " << expected_lane << ")";
     return;
   }
   EXPECT_EQ(int{expected.status[expected_lane]}, int{got.status[got_lane]})
@@ -83,8 +82,7 @@ Lanes pick(const Lanes& lanes, const std::vector<std::uint32_t>& which) {
 Lanes slice(const Lanes& lanes, std::size_t begin, std::size_t count) {
   Lanes part;
   part.count = count;
-  for (const auto& column : lanes.in)
-    part.in.emplace_back(column.data() + begin, column.data() + begin + count);
+  for (const auto& column : lanes.in) part.in.emplace_back(column.data() + begin, column.data() + begin + count);
   return part;
 }
 
@@ -99,20 +97,11 @@ Statistics recount(const std::vector<std::uint8_t>& status) {
   Statistics statistics;
   for (const std::uint8_t value : status) {
     switch (static_cast<LaneStatus>(value)) {
-      case LaneStatus::accepted:
-        ++statistics.accepted;
-        break;
-      case LaneStatus::occluded:
-        ++statistics.occluded;
-        break;
-      case LaneStatus::smooth:
-        ++statistics.smooth;
-        break;
-      case LaneStatus::invalid:
-        ++statistics.invalid;
-        break;
-      default:
-        ADD_FAILURE() << "status " << int{value} << " means nothing";
+      case LaneStatus::accepted: ++statistics.accepted; break;
+      case LaneStatus::occluded: ++statistics.occluded; break;
+      case LaneStatus::smooth: ++statistics.smooth; break;
+      case LaneStatus::invalid: ++statistics.invalid; break;
+      default: ADD_FAILURE() << "status " << int{value} << " means nothing";
     }
   }
   return statistics;

@@ -70,10 +70,8 @@ std::map<std::string, int> profile(const Call& call, const Lanes& lanes, const E
 }
 
 TEST(ForcedTarget, IsTheOneThatRuns) {
-  const std::map<Target, std::string> names = {{Target::scalar, "N_SCALAR"},
-                                               {Target::avx2, "N_AVX2"},
-                                               {Target::avx3, "N_AVX3"},
-                                               {Target::neon, "N_NEON"}};
+  const std::map<Target, std::string> names = {
+      {Target::scalar, "N_SCALAR"}, {Target::avx2, "N_AVX2"}, {Target::avx3, "N_AVX3"}, {Target::neon, "N_NEON"}};
   const Lanes lanes = hard_lanes(Kind::ordinary, 4096, 15);
   for (const Operation operation : all_operations()) {
     Call call{operation, Sampler::cap, Shadowing::correlated};
@@ -81,8 +79,7 @@ TEST(ForcedTarget, IsTheOneThatRuns) {
     for (const Target target : available_targets())
       for (const bool one_lane : {false, true}) {
         const auto kernels = profile(call, lanes, {target, one_lane, true});
-        const std::string expected =
-            names.at(target) + " " + std::to_string(one_lane ? 1 : vector_lanes(target));
+        const std::string expected = names.at(target) + " " + std::to_string(one_lane ? 1 : vector_lanes(target));
         ASSERT_EQ(kernels.size(), 1u) << call_name(call) << ", " << name(target);
         EXPECT_EQ(kernels.begin()->first, expected) << call_name(call);
       }

@@ -21,8 +21,7 @@ std::vector<Call> sampling_calls() {
   return calls;
 }
 
-Answer generate(const Call& call, const Lanes& lanes, const Generator& generator,
-                const Execution& execution = {}) {
+Answer generate(const Call& call, const Lanes& lanes, const Generator& generator, const Execution& execution = {}) {
   Answer answer;
   Batch batch = make_batch(call, lanes, answer);
   batch.u1 = batch.u2 = batch.u3 = {};
@@ -69,8 +68,7 @@ TEST(Generator, SeedAndDimensionMatter) {
   const Lanes lanes = hard_lanes(Kind::ordinary, 200, 72);
   const Call call{Operation::sample_reflection, Sampler::exact, Shadowing::correlated};
   std::vector<Answer> all;
-  for (const std::uint64_t seed :
-       {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{1} << 32, std::uint64_t{1} << 63})
+  for (const std::uint64_t seed : {std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{1} << 32, std::uint64_t{1} << 63})
     for (const std::uint32_t dimension : {0u, 1u, 1u << 31})
       all.push_back(generate(call, lanes, {.seed = seed, .dimension = dimension}));
   for (std::size_t a = 0; a < all.size(); ++a)
@@ -100,8 +98,8 @@ TEST(Generator, OneIdForAllLanes) {
   const std::uint64_t id = 0xFEDCBA9876543210u;
   alignas(8) char memory[12];
   std::memcpy(memory + 4, &id, 8);
-  for (const auto& column : {Column<std::uint64_t>(id),
-                             Column<std::uint64_t>(reinterpret_cast<const std::uint64_t*>(memory + 4), 1)}) {
+  for (const auto& column :
+       {Column<std::uint64_t>(id), Column<std::uint64_t>(reinterpret_cast<const std::uint64_t*>(memory + 4), 1)}) {
     const Generator generator{.seed = 5, .dimension = 0, .id = column};
     const Lanes columns = with_numbers(lanes, generator, std::vector<std::uint64_t>(500, id));
     for (const Call& call : sampling_calls())

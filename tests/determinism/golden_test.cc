@@ -12,7 +12,8 @@ namespace {
 
 constexpr std::size_t kLanes = 20'011;  // in quick builds too: hashes cannot be of fewer
 
-constexpr const char* kHead = R"(# What every target on every architecture must compute, to the last bit: a hash of all outputs of each call
+constexpr const char* kHead =
+    R"(# What every target on every architecture must compute, to the last bit: a hash of all outputs of each call
 # (digest() in tests/support/call.cc) for adversarial_lanes(20011, 5). Written by a test; after a change that is meant
 # to change results, from the project's folder:
 #   FACETWISE_WRITE_GOLDEN=tests/determinism/golden.txt build/release/bin/test_determinism --gtest_filter='Golden.*'
@@ -47,15 +48,14 @@ TEST(Golden, EveryTargetGivesTheCommittedBits) {
         const Answer answer = compute(call, lanes, {.target = target, .one_lane = one_lane});
         EXPECT_EQ(answer.statistics.lanes(), kLanes);
         EXPECT_EQ(digest(answer), golden[call_name(call)])
-            << call_name(call) << " on " << name(target) << (one_lane ? ", one lane" : "") << ": "
-            << FACETWISE_GOLDEN << " says what to do if that is meant";
+            << call_name(call) << " on " << name(target) << (one_lane ? ", one lane" : "") << ": " << FACETWISE_GOLDEN
+            << " says what to do if that is meant";
       }
   if (!write) return;
   ASSERT_FALSE(HasFailure()) << "the targets disagree: nothing is written";
   std::ofstream file(path);
   file << kHead;
-  for (const Call& call : all_calls())
-    file << call_name(call) << ' ' << std::hex << golden[call_name(call)] << '\n';
+  for (const Call& call : all_calls()) file << call_name(call) << ' ' << std::hex << golden[call_name(call)] << '\n';
   file.close();
   ASSERT_TRUE(file.good()) << "cannot write " << path;
   GTEST_SKIP() << "wrote " << path;

@@ -166,7 +166,8 @@ TEST_P(Invariance, OutputsLeftOut) {
 
 std::string test_name(const testing::TestParamInfo<Call>& info) {
   std::string name = call_name(info.param);
-  std::replace_if(name.begin(), name.end(), [](char c) { return c == '/' || c == '-'; }, '_');
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '/' || c == '-'; }, '_');
   return name;
 }
 INSTANTIATE_TEST_SUITE_P(Calls, Invariance, testing::ValuesIn(all_calls()), test_name);

@@ -7,8 +7,8 @@
 namespace facetwise::test {
 namespace {
 
-void expect_part(const Call& call, const Lanes& lanes, const Answer& whole, std::size_t begin,
-                 std::size_t count, const Execution& execution) {
+void expect_part(const Call& call, const Lanes& lanes, const Answer& whole, std::size_t begin, std::size_t count,
+                 const Execution& execution) {
   SCOPED_TRACE(std::to_string(count) + " lanes from " + std::to_string(begin));
   const Answer part = compute(call, slice(lanes, begin, count), execution);
   for (std::size_t k = 0; k < count; ++k) expect_same_lane(call, whole, begin + k, part, k);

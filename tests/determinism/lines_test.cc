@@ -12,7 +12,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kLine = 16;    // floats
+constexpr std::size_t kLine = 16;     // floats
 constexpr std::size_t kLanes = 1100;  // and up to a line more: beyond the lengths that are not aligned
 constexpr unsigned char kUntouched = 0xA5;
 

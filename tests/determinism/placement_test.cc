@@ -101,8 +101,7 @@ TEST(Placement, AnyStride) {
     const Lanes lanes = hard_lanes(Kind::mixed, count, 44 + count);
     for (const Call& call : all_calls()) {
       const Answer expected = compute(call, lanes);
-      for (const std::uint64_t gap : {1u, 2u, 12u})
-        expect_same_placed(call, lanes, expected, ++seed, gap, {});
+      for (const std::uint64_t gap : {1u, 2u, 12u}) expect_same_placed(call, lanes, expected, ++seed, gap, {});
       if (HasFailure()) return;
     }
   }

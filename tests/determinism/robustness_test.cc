@@ -18,9 +18,17 @@ constexpr std::size_t kLanes = 1'000'000;
 #endif
 
 enum Input {
-  kX = input::incident_x, kY, kZ, kAlphaX, kAlphaY,
-  kOx = input::outgoing_x, kOy, kOz,
-  kU1 = input::u1, kU2, kU3
+  kX = input::incident_x,
+  kY,
+  kZ,
+  kAlphaX,
+  kAlphaY,
+  kOx = input::outgoing_x,
+  kOy,
+  kOz,
+  kU1 = input::u1,
+  kU2,
+  kU3
 };
 enum Output { kOutX = 0, kOutZ = 2, kMx, kMy, kMz, kIm, kPdf, kWeight, kValue, kMasking, kArea, kShare };
 
@@ -132,12 +140,26 @@ TEST_P(Robustness, AnyBitPattern) {
 TEST_P(Robustness, EdgesOfEveryInput) {
   // Every combination of a few directions, roughnesses and random numbers at their limits.
   constexpr float kBelowOne = 0x1.fffffep-1f, kSteep = 0x1.fffffep-1f;
-  const std::vector<std::array<float, 3>> directions = {
-      {0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, -0.0f}, {1, 0, 1e-30f}, {1, 0, -1e-30f}, {1, 0, 1e-40f},
-      {0.6f, 0, 0.8f}, {0.6f, 0, -0.8f}, {1e-20f, 0, 1}, {1e-20f, 1e-20f, -1}, {3e-8f, 0, -1}, {1e-4f, 0, -1},
-      {0, 1e-2f, -kSteep}, {1.0004f, 0, 1e-4f}, {0.0f, 0.0f, 1.0004f}, {0, 0, -0.9996f}, {0, 0, -1.0004f}};
-  const std::vector<std::pair<float, float>> alphas = {{1e-4f, 1e-4f}, {1e-4f, 10}, {10, 1e-4f}, {10, 10},
-                                                       {1, 1}, {0.3f, 0.3f}, {0.01f, 2}, {4, 4}};
+  const std::vector<std::array<float, 3>> directions = {{0, 0, 1},
+                                                        {0, 0, -1},
+                                                        {1, 0, 0},
+                                                        {0, -1, -0.0f},
+                                                        {1, 0, 1e-30f},
+                                                        {1, 0, -1e-30f},
+                                                        {1, 0, 1e-40f},
+                                                        {0.6f, 0, 0.8f},
+                                                        {0.6f, 0, -0.8f},
+                                                        {1e-20f, 0, 1},
+                                                        {1e-20f, 1e-20f, -1},
+                                                        {3e-8f, 0, -1},
+                                                        {1e-4f, 0, -1},
+                                                        {0, 1e-2f, -kSteep},
+                                                        {1.0004f, 0, 1e-4f},
+                                                        {0.0f, 0.0f, 1.0004f},
+                                                        {0, 0, -0.9996f},
+                                                        {0, 0, -1.0004f}};
+  const std::vector<std::pair<float, float>> alphas = {{1e-4f, 1e-4f}, {1e-4f, 10},  {10, 1e-4f}, {10, 10},
+                                                       {1, 1},         {0.3f, 0.3f}, {0.01f, 2},  {4, 4}};
   const std::vector<float> us = {0, 1e-45f, 1e-38f, 0x1p-24f, 0.25f, 0.5f, 0.75f, kBelowOne};
   Lanes lanes;
   lanes.in.resize(input_fields().size());
@@ -177,7 +199,8 @@ TEST_P(Robustness, ABadLaneDisturbsNoOther) {
 
 std::string test_name(const testing::TestParamInfo<Call>& info) {
   std::string name = call_name(info.param);
-  std::replace_if(name.begin(), name.end(), [](char c) { return c == '/' || c == '-'; }, '_');
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '/' || c == '-'; }, '_');
   return name;
 }
 INSTANTIATE_TEST_SUITE_P(Calls, Robustness, testing::ValuesIn(plain_calls()), test_name);

@@ -30,10 +30,9 @@ TEST(Targets, SameBitsForAnyBits) { expect_targets_agree(hard_lanes(Kind::any_bi
 // The lanes above are as hard as they are said to be.
 TEST(Targets, LanesReachEveryStatus) {
   for (const Call& call : plain_calls()) {
-    const bool never_occluded =
-        call.operation == Operation::masking ||
-        (call.operation == Operation::sample_normal && call.sampler != Sampler::ndf) ||
-        (call.operation == Operation::sample_reflection && call.sampler == Sampler::exact);
+    const bool never_occluded = call.operation == Operation::masking ||
+                                (call.operation == Operation::sample_normal && call.sampler != Sampler::ndf) ||
+                                (call.operation == Operation::sample_reflection && call.sampler == Sampler::exact);
     for (const Kind kind : {Kind::mixed, Kind::any_bits}) {
       const Statistics statistics = compute(call, hard_lanes(kind, kLanes, 12)).statistics;
       constexpr std::uint64_t kSome = kLanes / 200;

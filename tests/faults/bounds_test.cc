@@ -18,8 +18,7 @@ class Exact {
   Exact(const std::vector<float>& values, std::size_t stride)
       : stride_(stride), count_(values.size()), bytes_(new char[size()]) {
     std::memset(bytes_.get(), 0xFF, size());
-    for (std::size_t lane = 0; lane < count_; ++lane)
-      std::memcpy(bytes_.get() + lane * stride, &values[lane], 4);
+    for (std::size_t lane = 0; lane < count_; ++lane) std::memcpy(bytes_.get() + lane * stride, &values[lane], 4);
   }
   std::size_t size() const { return count_ == 0 ? 0 : (count_ - 1) * stride_ + 4; }
   float* data() const { return reinterpret_cast<float*>(bytes_.get()); }
@@ -70,8 +69,7 @@ TEST(Bounds, ExactlySizedBuffers) {
           for (std::size_t c = 0; c < written.size(); ++c)
             ASSERT_EQ(std::bit_cast<std::uint32_t>(out[c].get(lane)),
                       std::bit_cast<std::uint32_t>(expected.out[written[c]][lane]))
-                << call_name(call) << ", " << output_fields()[written[c]].name << ", lane " << lane << " of "
-                << count;
+                << call_name(call) << ", " << output_fields()[written[c]].name << ", lane " << lane << " of " << count;
         }
         for (const Exact& column : out) ASSERT_TRUE(column.gaps_are_whole());
         for (const Exact& column : in) ASSERT_TRUE(column.gaps_are_whole());
@@ -94,8 +92,7 @@ TEST(Bounds, GuardsAroundColumns) {
         auto& column = input_fields()[k].column(batch);
         if (!column.present()) continue;
         in[k].assign(count + 2 * kGuards + 5, std::bit_cast<float>(~0u));
-        std::copy(lanes.in[k].begin(), lanes.in[k].end(),
-                  in[k].begin() + static_cast<std::ptrdiff_t>(shifted(k)));
+        std::copy(lanes.in[k].begin(), lanes.in[k].end(), in[k].begin() + static_cast<std::ptrdiff_t>(shifted(k)));
         column = {in[k].data() + shifted(k), count};
       }
       for (std::size_t k = 0; k < out.size(); ++k) {

@@ -17,9 +17,8 @@ struct Spoilt {
   Compaction call;
 
   Spoilt() {
-    columns = {
-        {Column<float>(from.data(), kLanes), OutputColumn<float>(to.data(), kLanes)},
-        {Column<float>(from.data() + kLanes, kLanes), OutputColumn<float>(to.data() + kLanes, kLanes)}};
+    columns = {{Column<float>(from.data(), kLanes), OutputColumn<float>(to.data(), kLanes)},
+               {Column<float>(from.data() + kLanes, kLanes), OutputColumn<float>(to.data() + kLanes, kLanes)}};
     call.lanes = kLanes;
     call.status = status;
     call.index = index;

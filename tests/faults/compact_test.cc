@@ -35,8 +35,7 @@ Queue make_queue(std::size_t lanes, unsigned share, std::uint64_t seed) {
 void expect_compacted(const Queue& queue, bool active, const Execution& execution) {
   const std::size_t positions = active ? queue.active.size() : queue.status.size();
   std::vector<std::uint32_t> index(positions, kUnwrittenIndex), expected_index;
-  std::vector<float> dense(positions, kUnwritten), strided(3 * positions, kUnwritten),
-      constant(positions, kUnwritten);
+  std::vector<float> dense(positions, kUnwritten), strided(3 * positions, kUnwritten), constant(positions, kUnwritten);
   for (std::size_t p = 0; p < positions; ++p) {
     const auto lane = active ? queue.active[p] : static_cast<std::uint32_t>(p);
     if (queue.status[lane] == kAccepted) expected_index.push_back(lane);
@@ -70,9 +69,8 @@ void expect_compacted(const Queue& queue, bool active, const Execution& executio
 // Sizes around the chunks that it works by (4096 lanes; 64 chunks at most).
 TEST(Compact, StableForAnySizeShareAndThreads) {
   const std::vector<std::size_t> sizes =
-      kQuick
-          ? std::vector<std::size_t>{0, 1, 2, 63, 4097, 20000}
-          : std::vector<std::size_t>{0, 1, 2, 63, 4095, 4096, 4097, 8192, 64 * 4096, 64 * 4096 + 1, 300'007};
+      kQuick ? std::vector<std::size_t>{0, 1, 2, 63, 4097, 20000}
+             : std::vector<std::size_t>{0, 1, 2, 63, 4095, 4096, 4097, 8192, 64 * 4096, 64 * 4096 + 1, 300'007};
   for (const std::size_t lanes : sizes)
     for (const unsigned share : {0u, 3u, 128u, 255u, 256u}) {
       const Queue queue = make_queue(lanes, share, lanes + share);
@@ -95,8 +93,7 @@ TEST(Compact, OutputsOnRequest) {
   compaction.status = queue.status;
   const auto counted = compact(compaction);  // neither an index nor columns: a count
   ASSERT_TRUE(counted.ok());
-  EXPECT_EQ(*counted,
-            static_cast<std::size_t>(std::count(queue.status.begin(), queue.status.end(), kAccepted)));
+  EXPECT_EQ(*counted, static_cast<std::size_t>(std::count(queue.status.begin(), queue.status.end(), kAccepted)));
   EXPECT_GT(*counted, 0u);
   EXPECT_EQ(*local_engine()->compact(compaction), *counted);
 }

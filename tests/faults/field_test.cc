@@ -81,8 +81,7 @@ TEST(Field, OutputThatTheOperationDoesNotCompute) {
 TEST(Field, InputOfTheWrongLength) {
   constexpr std::size_t kLanes = MalformedCall::kLanes;
   for_each_input(true, [](const Call& call, const InputField& field) {
-    for (const std::size_t count :
-         {std::size_t{0}, std::size_t{2}, kLanes - 1, kLanes + 1, ~std::size_t{0}}) {
+    for (const std::size_t count : {std::size_t{0}, std::size_t{2}, kLanes - 1, kLanes + 1, ~std::size_t{0}}) {
       MalformedCall spoilt(call);
       field.column(spoilt.batch) = over(field.column(spoilt.batch), count, sizeof(float));
       spoilt.refused(field.name);
@@ -154,16 +153,14 @@ TEST(Field, MisalignedPointer) {
 TEST(Field, BadStride) {
   constexpr std::size_t kLanes = MalformedCall::kLanes, kNegative = ~std::size_t{0} - 3;
   for_each_input(true, [](const Call& call, const InputField& field) {
-    for (const std::size_t stride :
-         {std::size_t{1}, std::size_t{5}, std::size_t{6}, kNegative, kNegative / 8 * 4}) {
+    for (const std::size_t stride : {std::size_t{1}, std::size_t{5}, std::size_t{6}, kNegative, kNegative / 8 * 4}) {
       MalformedCall spoilt(call);
       field.column(spoilt.batch) = over(field.column(spoilt.batch), kLanes, stride);
       spoilt.refused(field.name);
     }
   });
   for_each_output(true, [](const Call& call, const OutputField& field) {
-    for (const std::size_t stride :
-         {std::size_t{0}, std::size_t{1}, std::size_t{3}, std::size_t{6}, kNegative}) {
+    for (const std::size_t stride : {std::size_t{0}, std::size_t{1}, std::size_t{3}, std::size_t{6}, kNegative}) {
       MalformedCall spoilt(call);
       field.column(spoilt.batch) = over(field.column(spoilt.batch), kLanes, stride);
       spoilt.refused(field.name);

@@ -5,12 +5,10 @@
 namespace facetwise::test {
 
 bool same_bytes(const std::vector<float>& a, const std::vector<float>& b) {
-  return a.size() == b.size() &&
-         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0);
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0);
 }
 
-MalformedCall::MalformedCall(const Call& call, std::size_t count)
-    : lanes(ordinary_lanes(count, 1)), call_(call) {
+MalformedCall::MalformedCall(const Call& call, std::size_t count) : lanes(ordinary_lanes(count, 1)), call_(call) {
   batch = make_batch(call, lanes, answer);
   lanes_before_ = lanes;
   answer_before_ = answer;
@@ -32,8 +30,7 @@ void MalformedCall::refused(std::string_view field) {
   for (std::size_t k = 0; k < lanes.in.size(); ++k)
     EXPECT_TRUE(same_bytes(lanes.in[k], lanes_before_.in[k])) << input_fields()[k].name << " was written";
   for (std::size_t k = 0; k < answer.out.size(); ++k)
-    EXPECT_TRUE(same_bytes(answer.out[k], answer_before_.out[k]))
-        << output_fields()[k].name << " was written";
+    EXPECT_TRUE(same_bytes(answer.out[k], answer_before_.out[k])) << output_fields()[k].name << " was written";
   EXPECT_EQ(answer.status, answer_before_.status);
 }
 

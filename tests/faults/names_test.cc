@@ -19,9 +19,9 @@ void expect_round_trip(std::initializer_list<T> values, std::optional<T> (*parse
 }
 
 TEST(Names, RoundTrip) {
-  expect_round_trip({Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong,
-                     Distribution::table},
-                    parse_distribution);
+  expect_round_trip(
+      {Distribution::ggx, Distribution::beckmann, Distribution::student_t, Distribution::phong, Distribution::table},
+      parse_distribution);
   expect_round_trip({Masking::smith, Masking::vcavity}, parse_masking);
   expect_round_trip({Shadowing::correlated, Shadowing::uncorrelated}, parse_shadowing);
   expect_round_trip({Normalisation::unbiased, Normalisation::biased}, parse_normalisation);
@@ -31,9 +31,8 @@ TEST(Names, RoundTrip) {
                     parse_sampler);
   expect_round_trip({Target::best, Target::scalar, Target::avx2, Target::avx3, Target::neon}, parse_target);
   expect_round_trip({Operation::sample_normal, Operation::sample_reflection, Operation::pdf_reflection,
-                     Operation::evaluate_reflection, Operation::masking,
-                     Operation::sample_transmission, Operation::evaluate_transmission, Operation::sample_scattering,
-                     Operation::evaluate_scattering},
+                     Operation::evaluate_reflection, Operation::masking, Operation::sample_transmission,
+                     Operation::evaluate_transmission, Operation::sample_scattering, Operation::evaluate_scattering},
                     parse_operation);
   EXPECT_EQ(name(Sampler::cap), "cap");
   EXPECT_EQ(name(LaneStatus::accepted), "accepted");

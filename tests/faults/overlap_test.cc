@@ -44,9 +44,8 @@ TEST(Overlap, EveryOutputWithEveryInput) {
             EXPECT_NE(message.find(std::string(in->name)), message.npos) << message;
           }
         };
-        for (const std::ptrdiff_t shift :
-             {-std::ptrdiff_t{kLanes}, 1 - std::ptrdiff_t{kLanes}, std::ptrdiff_t{-1}, std::ptrdiff_t{0},
-              std::ptrdiff_t{1}, std::ptrdiff_t{kLanes - 1}})
+        for (const std::ptrdiff_t shift : {-std::ptrdiff_t{kLanes}, 1 - std::ptrdiff_t{kLanes}, std::ptrdiff_t{-1},
+                                           std::ptrdiff_t{0}, std::ptrdiff_t{1}, std::ptrdiff_t{kLanes - 1}})
           place(shift, sizeof(float));
         place(0, 2 * sizeof(float));  // the same start, other lanes
         EXPECT_TRUE(same_bytes(memory, before));
@@ -134,11 +133,9 @@ TEST(Overlap, MembersOfStructures) {
     MalformedCall whole(call);
     std::size_t next = 0;
     const std::size_t stride = members * sizeof(float);
-    for (const OutputField* out : present.out)
-      out->column(whole.batch) = {memory.data() + next++, kLanes, stride};
+    for (const OutputField* out : present.out) out->column(whole.batch) = {memory.data() + next++, kLanes, stride};
     whole.batch.out.status = {reinterpret_cast<std::uint8_t*>(memory.data() + next++) + 3, kLanes, stride};
-    for (const InputField* in : present.in)
-      in->column(whole.batch) = {memory.data() + next++, kLanes, stride};
+    for (const InputField* in : present.in) in->column(whole.batch) = {memory.data() + next++, kLanes, stride};
     whole.accepted();
 
     // One byte too far: the status in a member's memory.
@@ -148,12 +145,10 @@ TEST(Overlap, MembersOfStructures) {
     spoilt.refused("out.status");
     // The same structure shifted by a lane.
     spoilt.batch = whole.batch;
-    present.out[0]->column(spoilt.batch) = {memory.data() + present.out.size() + 1 + members, kLanes - 1,
-                                            stride};
+    present.out[0]->column(spoilt.batch) = {memory.data() + present.out.size() + 1 + members, kLanes - 1, stride};
     spoilt.batch.lanes = kLanes - 1;
     for (const OutputField* out : present.out)
-      if (out != present.out[0])
-        out->column(spoilt.batch) = {out->column(spoilt.batch).data(), kLanes - 1, stride};
+      if (out != present.out[0]) out->column(spoilt.batch) = {out->column(spoilt.batch).data(), kLanes - 1, stride};
     for (const InputField* in : present.in)
       in->column(spoilt.batch) = {in->column(spoilt.batch).data(), kLanes - 1, stride};
     spoilt.batch.out.status = {whole.batch.out.status.data(), kLanes - 1, stride};

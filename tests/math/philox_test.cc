@@ -61,8 +61,7 @@ TEST(PhiloxKernel, KnownAnswerOfTheZeroCounter) {
 TEST(PhiloxKernel, SeedsDimensionsAndFirstIds) {
   const std::uint64_t firsts[] = {
       0, 1, 0xFFFFFFFFu, 0xFFFFFFFFu - 7, 0x1'0000'0000u, 0x7FFF'FFFF'FFFF'FFF0u, ~std::uint64_t{0} - 20};
-  const std::uint64_t seeds[] = {
-      0, 1, 0xFFFFFFFFu, 0x1'0000'0000u, 0x0123'4567'89AB'CDEFu, ~std::uint64_t{0}};
+  const std::uint64_t seeds[] = {0, 1, 0xFFFFFFFFu, 0x1'0000'0000u, 0x0123'4567'89AB'CDEFu, ~std::uint64_t{0}};
   for (const std::uint64_t seed : seeds)
     for (const std::uint64_t first : firsts)
       for (const std::uint32_t dimension : {0u, 1u, 0x8000'0000u, ~0u})

@@ -26,8 +26,7 @@ void SinCosTurns(const float* u, std::size_t n, float* sin, float* cos) {
 
 using Function = void (*)(const float*, std::size_t, float*, float*);
 extern const Function kSinCosTurns[3];
-const Function kSinCosTurns[3] = {SinCosTurns<hn::ScalableTag<float>>,
-                                  SinCosTurns<Twice<hn::ScalableTag<float>>>,
+const Function kSinCosTurns[3] = {SinCosTurns<hn::ScalableTag<float>>, SinCosTurns<Twice<hn::ScalableTag<float>>>,
                                   SinCosTurns<hn::CappedTag<float, 1>>};
 
 }  // namespace HWY_NAMESPACE
@@ -84,18 +83,10 @@ void truth(float u, double& sin, double& cos) {
   const double x = 2 * std::numbers::pi * (u - 0.25 * quadrant);
   const double s = std::sin(x), c = std::cos(x);
   switch (quadrant & 3) {
-    case 0:
-      sin = s, cos = c;
-      break;
-    case 1:
-      sin = c, cos = -s;
-      break;
-    case 2:
-      sin = -s, cos = -c;
-      break;
-    default:
-      sin = -c, cos = s;
-      break;
+    case 0: sin = s, cos = c; break;
+    case 1: sin = c, cos = -s; break;
+    case 2: sin = -s, cos = -c; break;
+    default: sin = -c, cos = s; break;
   }
 }
 
@@ -103,8 +94,8 @@ struct Worst {
   double error = 0, squares = 0;
   float at = 0, squares_at = 0;
   void print(const char* what) const {
-    std::printf("%s: largest error %.3g at u = %.9g; largest |sin^2 + cos^2 - 1| %.3g at u = %.9g\n", what,
-                error, at, squares, squares_at);
+    std::printf("%s: largest error %.3g at u = %.9g; largest |sin^2 + cos^2 - 1| %.3g at u = %.9g\n", what, error, at,
+                squares, squares_at);
   }
 };
 
@@ -156,8 +147,7 @@ TEST(SinCosTurn, EveryMultipleOfTheGenerator) {
 TEST(SinCosTurn, AnyOtherU) {
   std::vector<float> u;
   const std::uint32_t one = std::bit_cast<std::uint32_t>(1.0f);
-  for (std::uint32_t bits = 0; bits < one; bits += kQuick ? 300'007 : 3'001)
-    u.push_back(std::bit_cast<float>(bits));
+  for (std::uint32_t bits = 0; bits < one; bits += kQuick ? 300'007 : 3'001) u.push_back(std::bit_cast<float>(bits));
   for (int eighth = 1; eighth <= 8; ++eighth)
     for (std::uint32_t distance = 1; distance < 200; ++distance) {
       const std::uint32_t bits = std::bit_cast<std::uint32_t>(0.125f * static_cast<float>(eighth));

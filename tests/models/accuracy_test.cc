@@ -22,32 +22,14 @@ using reference::Vector;
 constexpr double kUnit = 0x1p-24;
 // Below this, parts of an answer leave the floats' normal range, and its digits are lost: Student-t has sixth
 // powers.
-double smallest(const Composition& c) {
-  return c.model.distribution == Distribution::student_t ? 1e-15 : 1e-24;
-}
+double smallest(const Composition& c) { return c.model.distribution == Distribution::student_t ? 1e-15 : 1e-24; }
 
 constexpr double kFloor = 64, kFactor = 4;
 
 using Truth = double (*)(const Composition&, const double (&)[kPointFloats]);
 
 // The members of Point as doubles, so that they can be moved by less than a float's spacing.
-enum Slot {
-  kIx,
-  kIy,
-  kIz,
-  kAlphaX,
-  kAlphaY,
-  kMeanX,
-  kMeanY,
-  kCorrelation,
-  kEta,
-  kF0,
-  kF90,
-  kOx,
-  kOy,
-  kOz,
-  kSlots
-};
+enum Slot { kIx, kIy, kIz, kAlphaX, kAlphaY, kMeanX, kMeanY, kCorrelation, kEta, kF0, kF90, kOx, kOy, kOz, kSlots };
 
 Surface surface_at(const Composition& c, const double (&v)[kPointFloats]) {
   Surface s = surface_of(c, Point{});
@@ -88,8 +70,8 @@ struct Row {
   std::size_t unexplained = 0;
 };
 
-void compare(Row& row, const char* what, Truth truth, const Composition& c, const Point& point, float got,
-             double floor, double factor) {
+void compare(Row& row, const char* what, Truth truth, const Composition& c, const Point& point, float got, double floor,
+             double factor) {
   // o = -i to the last bits has no half vector.
   const Vector i = incident(point), from = c.model.retro ? turned(i) : i, o = outgoing(point);
   if (std::hypot(from.x + o.x, from.y + o.y, from.z + o.z) < 0x1.001p-20) return;
@@ -222,10 +204,10 @@ TEST_P(ModelAccuracy, Scattering) {
         return reference::evaluate_transmission(surface_at(c, v), i_at(v), o_at(v));
       };
       for (std::size_t n = 0; n < points.size(); ++n) {
-        compare(pdfs, forced ? "forced pdf" : "scattering pdf", forced ? forced_pdf : pdf, c, points[n],
-                results[n].pdf, kFloor, 4 * kFactor);
-        compare(values, forced ? "forced value" : "scattering value", forced ? forced_value : value, c,
-                points[n], results[n].value, kFloor, 4 * kFactor);
+        compare(pdfs, forced ? "forced pdf" : "scattering pdf", forced ? forced_pdf : pdf, c, points[n], results[n].pdf,
+                kFloor, 4 * kFactor);
+        compare(values, forced ? "forced value" : "scattering value", forced ? forced_value : value, c, points[n],
+                results[n].value, kFloor, 4 * kFactor);
       }
     }
     finish(GetParam(), forced ? "forced pdf" : "scattering pdf", pdfs);

@@ -27,8 +27,7 @@ std::vector<int> group(const std::vector<double>& parts, int groups) {
   for (const double part : parts) total += part;
   std::vector<int> of;
   for (const double part : parts) {
-    of.push_back(total > 0 ? std::clamp(static_cast<int>((sum + part / 2) / total * groups), 0, groups - 1)
-                           : 0);
+    of.push_back(total > 0 ? std::clamp(static_cast<int>((sum + part / 2) / total * groups), 0, groups - 1) : 0);
     sum += part;
   }
   return of;
@@ -58,8 +57,8 @@ struct Cells {
 };
 
 // The samples' p-values with the density of `claimed` points, the same cells for all.
-std::vector<ChiSquare> test_reflections(const Composition& c, const Point& point,
-                                        const std::vector<Point>& claimed, std::uint64_t seed) {
+std::vector<ChiSquare> test_reflections(const Composition& c, const Point& point, const std::vector<Point>& claimed,
+                                        std::uint64_t seed) {
   const reference::Surface s = surface_of(c, point);
   const Grid grid = make_grid(Operation::evaluate_reflection, c, point, kSide);
   const Cells cells(grid, 0);
@@ -119,12 +118,10 @@ TEST_P(ModelChiSquare, ReflectionsFollowTheDensity) {
       for (std::size_t n = 0; n < points.size(); ++n) {
         if (points[n].iz <= 0 && !sees_behind(c.model)) continue;
         if (student_t_straight_up(c, points[n])) continue;
-        const ChiSquare test =
-            test_reflections(c, points[n], {points[n]}, 100 * n + static_cast<int>(sampler))[0];
+        const ChiSquare test = test_reflections(c, points[n], {points[n]}, 100 * n + static_cast<int>(sampler))[0];
         smallest = std::min(smallest, test.p_value);
-        EXPECT_GE(test.p_value, sidak(kAnyFailure, kTests))
-            << "chi-square " << test.statistic << " at " << test.degrees << " degrees: " << describe(c)
-            << describe(points[n]);
+        EXPECT_GE(test.p_value, sidak(kAnyFailure, kTests)) << "chi-square " << test.statistic << " at " << test.degrees
+                                                            << " degrees: " << describe(c) << describe(points[n]);
         EXPECT_GE(test.degrees, kQuick ? 1 : 60) << describe(c) << describe(points[n]);
       }
     }
@@ -143,8 +140,7 @@ TEST_P(ModelChiSquare, WrongDensitiesAreRefused) {
       rougher.alpha_y *= 1.1f;
       set_incident(moved, unit({moved.ix - 0.12f, moved.iy, moved.iz}));
       sheared.correlation += 0.15f;
-      const std::vector<ChiSquare> tests =
-          test_reflections(c, points[n], {points[n], rougher, moved, sheared}, 77);
+      const std::vector<ChiSquare> tests = test_reflections(c, points[n], {points[n], rougher, moved, sheared}, 77);
       EXPECT_GE(tests[0].p_value, sidak(kAnyFailure, kTests)) << describe(c) << describe(points[n]);
       EXPECT_LT(tests[1].p_value, 1e-6) << "rougher: " << describe(c) << describe(points[n]);
       // `ndf` knows no i but by what reflects.
@@ -186,9 +182,8 @@ TEST_P(ModelChiSquare, NormalsFollowTheDensity) {
       if (counts.back() == 0)
         for (double& e : expected) e = &e == &expected.back() ? 0 : e * kCount / sum;
       const ChiSquare test = chi_square(counts, expected);
-      EXPECT_GE(test.p_value, sidak(kAnyFailure, kTests))
-          << "chi-square " << test.statistic << " at " << test.degrees << " degrees: " << describe(c)
-          << describe(point);
+      EXPECT_GE(test.p_value, sidak(kAnyFailure, kTests)) << "chi-square " << test.statistic << " at " << test.degrees
+                                                          << " degrees: " << describe(c) << describe(point);
     }
   }
 }

@@ -31,8 +31,7 @@ std::string refused(Operation operation, const Composition& c, std::string_view 
   const std::string message(statistics.status().message());
   EXPECT_EQ(message.rfind(std::string(field) + ": ", 0), 0u) << what << ": " << message;
   EXPECT_EQ(check(operation, batch), statistics.status()) << what;
-  EXPECT_EQ(std::memcmp(results.data(), before.data(), results.size() * sizeof(Result)), 0)
-      << what << " wrote";
+  EXPECT_EQ(std::memcmp(results.data(), before.data(), results.size() * sizeof(Result)), 0) << what << " wrote";
   return message;
 }
 
@@ -138,8 +137,7 @@ TEST_P(ModelComposition, ColumnsFollowTheInterface) {
 // Operations that have no use for the reflectance run with any interface.
 TEST_P(ModelComposition, OperationsWithoutReflectanceTakeAnyInterface) {
   for (const Interface interface : {Interface::schlick, Interface::dielectric})
-    for (const Operation operation :
-         {Operation::sample_normal, Operation::pdf_reflection, Operation::masking}) {
+    for (const Operation operation : {Operation::sample_normal, Operation::pdf_reflection, Operation::masking}) {
       Composition c = plain(GetParam(), Sampler::visible);
       c.model.interface = interface;
       run_points(operation, c, std::vector<Point>(5));
@@ -150,8 +148,7 @@ TEST_P(ModelComposition, RetroTakesNoMeanSlope) {
   if (!GetParam().affine) return;
   Composition c = plain(GetParam(), Sampler::visible);
   c.model.retro = true;
-  for (const Operation operation :
-       {Operation::sample_reflection, Operation::pdf_reflection, Operation::masking}) {
+  for (const Operation operation : {Operation::sample_reflection, Operation::pdf_reflection, Operation::masking}) {
     refused(operation, c, "model.retro", [](Batch& batch) { batch.mean_slope_x = 0.1f; });
     refused(operation, c, "model.retro", [](Batch& batch) { batch.mean_slope_y = 0.1f; });
     run_points(operation, c, std::vector<Point>(5));  // a correlation it takes
@@ -172,10 +169,8 @@ const Moment kMoments[] = {{"mean_slope_x", &Batch::mean_slope_x},
 // Moments are Smith's, with ggx and beckmann.
 TEST(ModelRefusals, MomentsAreRefusedByTheOthers) {
   for (const Family& family : families()) {
-    if (family.affine || (family.masking == Masking::smith && family.distribution != Distribution::student_t))
-      continue;
-    for (const Operation operation :
-         {Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
+    if (family.affine || (family.masking == Masking::smith && family.distribution != Distribution::student_t)) continue;
+    for (const Operation operation : {Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
       for (const Moment& moment : kMoments)
         refused(operation, plain(family, Sampler::visible), moment.field,
                 [&](Batch& batch) { batch.*moment.column = 0.25f; });
@@ -183,8 +178,7 @@ TEST(ModelRefusals, MomentsAreRefusedByTheOthers) {
 }
 
 TEST(ModelRefusals, MaskingsAndTablesFollowTheDistribution) {
-  for (const Operation operation :
-       {Operation::sample_normal, Operation::evaluate_reflection, Operation::masking}) {
+  for (const Operation operation : {Operation::sample_normal, Operation::evaluate_reflection, Operation::masking}) {
     const std::string message =
         refused(operation, plain({Distribution::phong, Masking::smith}, Sampler::visible), "model.masking");
     EXPECT_NE(message.find("vcavity"), std::string::npos) << message;

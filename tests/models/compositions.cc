@@ -35,16 +35,15 @@ float largest_alpha(Distribution distribution) {
 }  // namespace
 
 std::string name(const Family& family) {
-  return std::string(facetwise::name(family.distribution)) + "_" +
-         std::string(facetwise::name(family.masking)) + (family.affine ? "_affine" : "");
+  return std::string(facetwise::name(family.distribution)) + "_" + std::string(facetwise::name(family.masking)) +
+         (family.affine ? "_affine" : "");
 }
 void PrintTo(const Family& family, std::ostream* to) { *to << name(family); }
 
 std::string describe(const Composition& c) {
   std::string text;
-  for (const std::string_view part :
-       {name(c.model.distribution), name(c.model.masking), name(c.sampler), name(c.model.shadowing),
-        name(c.model.normalisation), name(c.model.interface)})
+  for (const std::string_view part : {name(c.model.distribution), name(c.model.masking), name(c.sampler),
+                                      name(c.model.shadowing), name(c.model.normalisation), name(c.model.interface)})
     text.append(part).append(" ");
   if (c.model.transport == Transport::importance) text += "importance ";
   if (c.model.retro) text += "retro ";
@@ -54,12 +53,11 @@ std::string describe(const Composition& c) {
 
 std::string describe(const Point& p) {
   char buffer[500];
-  std::snprintf(
-      buffer, sizeof buffer,
-      "i (%.9g, %.9g, %.9g) alpha %.9g %.9g mean (%.9g, %.9g) correlation %.9g eta %.9g f0 %.9g f90 %.9g "
-      "o (%.9g, %.9g, %.9g) u %.9g %.9g %.9g",
-      p.ix, p.iy, p.iz, p.alpha_x, p.alpha_y, p.mean_x, p.mean_y, p.correlation, p.eta, p.f0, p.f90, p.ox,
-      p.oy, p.oz, p.u1, p.u2, p.u3);
+  std::snprintf(buffer, sizeof buffer,
+                "i (%.9g, %.9g, %.9g) alpha %.9g %.9g mean (%.9g, %.9g) correlation %.9g eta %.9g f0 %.9g f90 %.9g "
+                "o (%.9g, %.9g, %.9g) u %.9g %.9g %.9g",
+                p.ix, p.iy, p.iz, p.alpha_x, p.alpha_y, p.mean_x, p.mean_y, p.correlation, p.eta, p.f0, p.f90, p.ox,
+                p.oy, p.oz, p.u1, p.u2, p.u3);
   return buffer;
 }
 
@@ -119,8 +117,7 @@ std::vector<Composition> compositions(const Family& family, Operation operation)
   return all;
 }
 
-Batch make_batch(Operation operation, const Composition& c, std::span<const Point> points,
-                 std::span<Result> results) {
+Batch make_batch(Operation operation, const Composition& c, std::span<const Point> points, std::span<Result> results) {
   const auto in = [&](float Point::*member) {
     return Column<float>(&(points.data()->*member), points.size(), sizeof(Point));
   };
@@ -176,8 +173,8 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
   return b;
 }
 
-std::vector<Result> run_points(Operation operation, const Composition& composition,
-                               std::span<const Point> points, const Execution& execution) {
+std::vector<Result> run_points(Operation operation, const Composition& composition, std::span<const Point> points,
+                               const Execution& execution) {
   std::vector<Result> results(points.size());
   const auto statistics = run(operation, make_batch(operation, composition, points, results), execution);
   EXPECT_TRUE(statistics.ok()) << describe(composition) << statistics.status();
@@ -217,9 +214,7 @@ Vector direction(double theta, double azimuth) {
   const double t = theta * std::numbers::pi / 180, a = azimuth * std::numbers::pi / 180;
   return {std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)};
 }
-bool accepted(const Result& result) {
-  return result.status == static_cast<std::uint8_t>(LaneStatus::accepted);
-}
+bool accepted(const Result& result) { return result.status == static_cast<std::uint8_t>(LaneStatus::accepted); }
 
 double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Vector unit(Vector a) {
@@ -258,24 +253,12 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
     Point& p = points[n];
     double z = 0;
     switch (n % 8) {
-      case 0:
-        z = 1;
-        break;
-      case 1:
-        z = std::pow(10, -8 * uniform(random));
-        break;
-      case 2:
-        z = -std::pow(10, -8 * uniform(random));
-        break;
-      case 3:
-        z = -1 + 1e-3 * uniform(random);
-        break;
-      case 4:
-        z = -uniform(random);
-        break;
-      default:
-        z = uniform(random);
-        break;
+      case 0: z = 1; break;
+      case 1: z = std::pow(10, -8 * uniform(random)); break;
+      case 2: z = -std::pow(10, -8 * uniform(random)); break;
+      case 3: z = -1 + 1e-3 * uniform(random); break;
+      case 4: z = -uniform(random); break;
+      default: z = uniform(random); break;
     }
     const double azimuth = 2 * std::numbers::pi * uniform(random), r = std::sqrt((1 - z) * (1 + z));
     set_incident(p, unit({r * std::cos(azimuth), r * std::sin(azimuth), z}));
@@ -294,8 +277,7 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
         p.mean_x = static_cast<float>(scale * std::cos(at));
         p.mean_y = static_cast<float>(scale * std::sin(at));
       }
-      if (random() % 4 != 0)
-        p.correlation = static_cast<float>((extreme ? 0.999 : 0.9) * (2 * uniform(random) - 1));
+      if (random() % 4 != 0) p.correlation = static_cast<float>((extreme ? 0.999 : 0.9) * (2 * uniform(random) - 1));
       if (extreme && random() % 8 == 0) p.correlation = std::copysign(0.999f, p.correlation);
       if (extreme && random() % 8 == 0) p.mean_x = std::copysign(100.0f, p.mean_x), p.mean_y = 0;
     }
@@ -317,9 +299,7 @@ std::vector<Point> hard_points(const Composition& c, std::size_t count, std::uin
         z = random() % 2 ? uniform(random) : std::pow(10, -6 * uniform(random));
         o = {std::sqrt((1 - z) * (1 + z)), 0, z};
         break;
-      case 1:
-        o = {-i.x, -i.y, std::abs(i.z)};
-        break;
+      case 1: o = {-i.x, -i.y, std::abs(i.z)}; break;
       default: {
         // A normal of the distribution, roughly, that i sees if one of some does.
         const reference::Surface s = surface_of(c, p);
@@ -384,14 +364,13 @@ std::vector<Point> calm_points(const Composition& c) {
 
 bool student_t_straight_up(const Composition& c, const Point& p) {
   return c.model.distribution == Distribution::student_t && c.model.masking == Masking::smith &&
-         c.sampler == Sampler::visible &&
-         std::hypot(p.alpha_x * p.ix, p.alpha_y * p.iy) < 1e-3f * std::abs(p.iz);
+         c.sampler == Sampler::visible && std::hypot(p.alpha_x * p.ix, p.alpha_y * p.iy) < 1e-3f * std::abs(p.iz);
 }
 
 HalfVector half_vector(const Composition& c, const Point& point, Vector i, Vector m) {
   const bool forms_it = c.model.distribution == Distribution::ggx && c.model.masking == Masking::smith &&
-                        (c.sampler == Sampler::cap || c.sampler == Sampler::visible ||
-                         c.sampler == Sampler::bounded || (c.sampler == Sampler::exact && i.z <= 0));
+                        (c.sampler == Sampler::cap || c.sampler == Sampler::visible || c.sampler == Sampler::bounded ||
+                         (c.sampler == Sampler::exact && i.z <= 0));
   if (!forms_it) return {};
   const reference::Surface s = surface_of(c, point);
   const double rho = s.slope_correlation, rest = std::sqrt((1 - rho) * (1 + rho));

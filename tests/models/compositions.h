@@ -66,8 +66,7 @@ struct Result {
 Batch make_batch(Operation operation, const Composition& composition, std::span<const Point> points,
                  std::span<Result> results);
 // Runs it; a failure of the test where the call is refused.
-std::vector<Result> run_points(Operation operation, const Composition& composition,
-                               std::span<const Point> points,
+std::vector<Result> run_points(Operation operation, const Composition& composition, std::span<const Point> points,
                                const Execution& execution = {.single_thread = true});
 
 // What the reference calls this lane: the composition with the point's floats.
@@ -111,15 +110,14 @@ struct HalfVector {
   double turn = 0;  // units
   double im = 0;    // units, relative
 };
-HalfVector half_vector(const Composition& composition, const Point& point, reference::Vector i,
-                       reference::Vector m);
+HalfVector half_vector(const Composition& composition, const Point& point, reference::Vector i, reference::Vector m);
 
 // Copies of a point with random u.
 std::vector<Point> with_random(const Point& point, std::size_t count, std::uint64_t seed);
 
 // Samples at one point from the generator.
-std::vector<Result> draw(Operation operation, const Composition& composition, const Point& point,
-                         std::size_t count, std::uint64_t seed, Statistics* statistics = nullptr);
+std::vector<Result> draw(Operation operation, const Composition& composition, const Point& point, std::size_t count,
+                         std::uint64_t seed, Statistics* statistics = nullptr);
 
 // A grid of side^2 standard slopes: t = atan(r) in [0, pi/2] and the azimuth, both in equal parts, t of the
 // part of [0, pi/2] that answers. What an operation (evaluate_reflection, evaluate_transmission or

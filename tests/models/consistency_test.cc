@@ -26,8 +26,7 @@ class ModelConsistency : public testing::TestWithParam<Family> {};
 double change(const Composition& c, const Point& point, Vector o) {
   const reference::Surface s = surface_of(c, point);
   const Vector i = incident(point);
-  const double pdf = reference::pdf_reflection(s, c.sampler, i, o),
-               value = reference::evaluate_reflection(s, i, o);
+  const double pdf = reference::pdf_reflection(s, c.sampler, i, o), value = reference::evaluate_reflection(s, i, o);
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
     double of_pdf = 0, of_value = 0;
@@ -35,8 +34,7 @@ double change(const Composition& c, const Point& point, Vector o) {
       Vector moved = o;
       (k == 0 ? moved.x : k == 1 ? moved.y : moved.z) += step;
       of_pdf = std::max(of_pdf, std::abs(reference::pdf_reflection(s, c.sampler, i, moved) / pdf - 1));
-      if (value > 0)
-        of_value = std::max(of_value, std::abs(reference::evaluate_reflection(s, i, moved) / value - 1));
+      if (value > 0) of_value = std::max(of_value, std::abs(reference::evaluate_reflection(s, i, moved) / value - 1));
     }
     sum += of_pdf + of_value;
   }
@@ -82,20 +80,18 @@ TEST_P(ModelConsistency, SamplesAgreeWithQueries) {
       const double error = std::abs(query.pdf / sample.pdf - 1) / kUnit;
       errors.push_back(error);
       worst = std::max(worst, (error - 32) / (moves + 1));
-      EXPECT_LE(error, 64 + 24 * moves)
-          << "pdf " << sample.pdf << ", query " << query.pdf << ": " << describe(c) << describe(points[n]);
+      EXPECT_LE(error, 64 + 24 * moves) << "pdf " << sample.pdf << ", query " << query.pdf << ": " << describe(c)
+                                        << describe(points[n]);
       if (sample.weight == 0 || query.value == 0) {
-        EXPECT_LE(std::max(sample.weight * sample.pdf, query.value), 1e-20)
-            << describe(c) << describe(points[n]);
+        EXPECT_LE(std::max(sample.weight * sample.pdf, query.value), 1e-20) << describe(c) << describe(points[n]);
         continue;
       }
-      const double value_error =
-          std::abs(query.value / (static_cast<double>(sample.weight) * query.pdf) - 1) / kUnit;
+      const double value_error = std::abs(query.value / (static_cast<double>(sample.weight) * query.pdf) - 1) / kUnit;
       value_errors.push_back(value_error);
       worst_value = std::max(worst_value, value_error / (64 + 8 / o.z + 24 * moves));
       EXPECT_LE(value_error, 64 + 8 / o.z + 24 * moves)
-          << "weight " << sample.weight << ", value " << query.value << ", pdf " << query.pdf << ": "
-          << describe(c) << describe(points[n]);
+          << "weight " << sample.weight << ", value " << query.value << ", pdf " << query.pdf << ": " << describe(c)
+          << describe(points[n]);
       if (HasFailure()) return;
     }
   }
@@ -137,10 +133,8 @@ TEST_P(ModelConsistency, NormalsHaveTheirDensity) {
       const double pdf = reference::pdf_normal(s, sampler, i, m);
       double moves = 0;
       for (const Vector& step : {Vector{kUnit, 0, 0}, Vector{0, kUnit, 0}, Vector{0, 0, kUnit}})
-        moves +=
-            std::abs(reference::pdf_normal(s, sampler, i, {m.x + step.x, m.y + step.y, m.z + step.z}) / pdf -
-                     1) /
-            kUnit;
+        moves += std::abs(reference::pdf_normal(s, sampler, i, {m.x + step.x, m.y + step.y, m.z + step.z}) / pdf - 1) /
+                 kUnit;
       moves = moves * (1 + half.turn) + half.im;
       if (!(moves * kUnit < 0.01)) continue;
       ++compared;
@@ -174,8 +168,8 @@ bool sane(const Result& r) {
   if (!finite({r.mx, r.my, r.mz, r.im, r.pdf, r.weight, r.value, r.masking, r.area, r.branch, r.eta_scale}))
     return false;
   if (r.status != static_cast<int>(LaneStatus::occluded) && !finite({r.ox, r.oy, r.oz})) return false;
-  return r.pdf >= 0 && r.weight >= 0 && r.value >= 0 && r.masking >= 0 && r.masking <= 1.00001f &&
-         r.area >= 0 && r.branch >= 0 && r.branch <= 1 && r.status <= 3;
+  return r.pdf >= 0 && r.weight >= 0 && r.value >= 0 && r.masking >= 0 && r.masking <= 1.00001f && r.area >= 0 &&
+         r.branch >= 0 && r.branch <= 1 && r.status <= 3;
 }
 
 // Ordinary points at the ends of everything.
@@ -185,47 +179,20 @@ std::vector<Point> adversarial(const Composition& c, std::size_t count, std::uin
   for (std::size_t n = 0; n < count; ++n) {
     Point& p = points[n];
     switch (n % 16) {
-      case 0:
-        p.ix = 1, p.iy = 0, p.iz = 0;
-        break;
-      case 1:
-        p.ix = p.iy = 0, p.iz = 1;
-        break;
-      case 2:
-        p.ix = p.iy = 0, p.iz = -1;
-        break;
-      case 3:
-        p.ix = 0, p.iy = -1, p.iz = 1e-30f;
-        break;
-      case 4:
-        p.ix = 0.6f, p.iy = 0.8f, p.iz = -1e-30f;
-        break;
-      case 5:
-        p.ix = 0.6f, p.iy = -0.8f, p.iz = -0.0f;
-        break;
-      case 6:
-        p.u1 = 0, p.u2 = 0, p.u3 = kBelowOne;
-        break;
-      case 7:
-        p.u1 = kBelowOne, p.u2 = 0.25f, p.u3 = 0;
-        break;
-      case 8:
-        p.u2 = kBelowOne, p.u1 = 1e-30f;
-        break;
-      case 9:
-        p.ox = -p.ix, p.oy = -p.iy, p.oz = -p.iz;
-        break;
-      case 10:
-        p.ox = p.ix, p.oy = p.iy, p.oz = p.iz;
-        break;
-      case 11:
-        p.ox = 1, p.oy = 0, p.oz = 1e-30f;
-        break;
-      case 12:
-        p.ox = 0, p.oy = 0, p.oz = 1;
-        break;
-      default:
-        break;
+      case 0: p.ix = 1, p.iy = 0, p.iz = 0; break;
+      case 1: p.ix = p.iy = 0, p.iz = 1; break;
+      case 2: p.ix = p.iy = 0, p.iz = -1; break;
+      case 3: p.ix = 0, p.iy = -1, p.iz = 1e-30f; break;
+      case 4: p.ix = 0.6f, p.iy = 0.8f, p.iz = -1e-30f; break;
+      case 5: p.ix = 0.6f, p.iy = -0.8f, p.iz = -0.0f; break;
+      case 6: p.u1 = 0, p.u2 = 0, p.u3 = kBelowOne; break;
+      case 7: p.u1 = kBelowOne, p.u2 = 0.25f, p.u3 = 0; break;
+      case 8: p.u2 = kBelowOne, p.u1 = 1e-30f; break;
+      case 9: p.ox = -p.ix, p.oy = -p.iy, p.oz = -p.iz; break;
+      case 10: p.ox = p.ix, p.oy = p.iy, p.oz = p.iz; break;
+      case 11: p.ox = 1, p.oy = 0, p.oz = 1e-30f; break;
+      case 12: p.ox = 0, p.oy = 0, p.oz = 1; break;
+      default: break;
     }
     if (n % 5 == 0) p.alpha_x = 1e-4f;
     if (n % 7 == 0 && !c.affine) p.alpha_y = c.model.distribution == Distribution::phong ? 1 : 10;
@@ -236,8 +203,7 @@ std::vector<Point> adversarial(const Composition& c, std::size_t count, std::uin
 
 // Any bit pattern, or an awkward value, in some of the inputs of some of the lanes.
 std::vector<Point> corrupted(std::vector<Point> points, std::uint64_t seed) {
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(),
-                  kInf = std::numeric_limits<float>::infinity();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
   constexpr float kBad[] = {kNan,    -kNan, kInf, -kInf,   -0.0f,    0.0f,  1e-40f, 5e-5f,
                             10.001f, 1,     -1,   1.0005f, 0x1p100f, -0.1f, 200};
   std::mt19937_64 random(seed);
@@ -272,10 +238,9 @@ TEST_P(ModelConsistency, NothingIsNanNegativeOrInfinite) {
       for (std::size_t n = 0; n < points.size(); ++n) {
         const Result& r = results[n];
         if (beckmann_straight_below(c, points[n])) continue;
-        ASSERT_TRUE(sane(r)) << name(operation) << " " << describe(c) << describe(points[n]) << " pdf "
-                             << r.pdf << " weight " << r.weight << " value " << r.value << " masking "
-                             << r.masking << " area " << r.area << " o " << r.ox << " " << r.oy << " " << r.oz
-                             << " status " << int{r.status};
+        ASSERT_TRUE(sane(r)) << name(operation) << " " << describe(c) << describe(points[n]) << " pdf " << r.pdf
+                             << " weight " << r.weight << " value " << r.value << " masking " << r.masking << " area "
+                             << r.area << " o " << r.ox << " " << r.oy << " " << r.oz << " status " << int{r.status};
         // Correlation can make a principal roughness too large.
         ASSERT_TRUE(r.status != static_cast<int>(LaneStatus::invalid) || GetParam().affine)
             << name(operation) << " " << describe(c) << describe(points[n]);
@@ -298,8 +263,7 @@ TEST_P(ModelConsistency, BadLanesAreZeroAndDisturbNoOther) {
     for (const Composition& c : all_compositions(GetParam(), operation)) {
       const std::vector<Point> points = adversarial(c, std::max<std::size_t>(kLanes / 4, 256) + 3, ++seed),
                                bad = corrupted(points, seed);
-      const std::vector<Result> good = run_points(operation, c, points),
-                                results = run_points(operation, c, bad);
+      const std::vector<Result> good = run_points(operation, c, points), results = run_points(operation, c, bad);
       std::size_t invalid = 0;
       for (std::size_t n = 0; n < points.size(); ++n) {
         if (std::memcmp(&points[n], &bad[n], sizeof(Point)) == 0) {
@@ -364,8 +328,7 @@ TEST_P(ModelConsistency, OccludedDirectionsAreFinite) {
 
 // Each way in which a lane can be bad, one at a time.
 TEST_P(ModelConsistency, EveryBadInputIsInvalid) {
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(),
-                  kInf = std::numeric_limits<float>::infinity();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
   struct Bad {
     float Point::*member;
     std::vector<float> values;
@@ -456,8 +419,7 @@ TEST_P(ModelConsistency, LongMeanSlopesAreInvalid) {
 // Without the directions that OccludedDirectionsAreFinite is about: NaN have a sign.
 std::vector<Result> comparable(std::vector<Result> results) {
   for (Result& r : results)
-    if (!finite({r.ox, r.oy, r.oz}) && r.status == static_cast<int>(LaneStatus::occluded))
-      r.ox = r.oy = r.oz = 0;
+    if (!finite({r.ox, r.oy, r.oz}) && r.status == static_cast<int>(LaneStatus::occluded)) r.ox = r.oy = r.oz = 0;
   return results;
 }
 
@@ -471,12 +433,12 @@ TEST_P(ModelConsistency, SameBitsOnEveryTarget) {
       const std::vector<Result> best = comparable(run_points(operation, c, points));
       for (const Target target : available_targets())
         for (const bool one_lane : {false, true}) {
-          const std::vector<Result> other = comparable(run_points(
-              operation, c, points, {.target = target, .one_lane = one_lane, .single_thread = true}));
+          const std::vector<Result> other = comparable(
+              run_points(operation, c, points, {.target = target, .one_lane = one_lane, .single_thread = true}));
           for (std::size_t n = 0; n < points.size(); ++n)
             ASSERT_EQ(std::memcmp(&best[n], &other[n], sizeof(Result)), 0)
-                << name(operation) << " " << describe(c) << name(target) << (one_lane ? " one lane" : "")
-                << ": " << describe(points[n]);
+                << name(operation) << " " << describe(c) << name(target) << (one_lane ? " one lane" : "") << ": "
+                << describe(points[n]);
         }
     }
 }
@@ -489,8 +451,7 @@ TEST(ModelStraightBelow, WeightsAreFinite) {
     for (const Sampler sampler : samplers_of(family, Operation::sample_reflection)) {
       const Composition c = plain(family, sampler);
       const std::vector<Point> points = with_random({.iz = -1}, 4096, 9);
-      for (const Result& r : run_points(Operation::sample_reflection, c, points))
-        ASSERT_TRUE(sane(r)) << describe(c);
+      for (const Result& r : run_points(Operation::sample_reflection, c, points)) ASSERT_TRUE(sane(r)) << describe(c);
     }
 }
 

@@ -18,8 +18,7 @@ class ModelFurnace : public testing::TestWithParam<Family> {};
 
 TEST_P(ModelFurnace, MeanWeightIsTheAlbedo) {
   for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated}) {
-    if (shadowing == Shadowing::uncorrelated && GetParam().masking == Masking::vcavity)
-      continue;  // no part there
+    if (shadowing == Shadowing::uncorrelated && GetParam().masking == Masking::vcavity) continue;  // no part there
     // The reference's integrals take long on an emulator; they are the same there.
     if (kQuick && shadowing == Shadowing::uncorrelated) continue;
     for (const Interface interface : {Interface::conductor, Interface::schlick, Interface::dielectric}) {
@@ -98,8 +97,7 @@ TEST_P(ModelFurnace, ReflectionIsReciprocal) {
     std::size_t compared = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {
       const Point& p = points[n];
-      const double mx = c.affine && !c.model.retro ? p.mean_x : 0,
-                   my = c.affine && !c.model.retro ? p.mean_y : 0;
+      const double mx = c.affine && !c.model.retro ? p.mean_x : 0, my = c.affine && !c.model.retro ? p.mean_y : 0;
       const double zi = p.iz - mx * p.ix - my * p.iy, zo = p.oz - mx * p.ox - my * p.oy;
       if (zi < 0.02 || zo < 0.02 || there[n].value < 1e-12f) continue;
       ++compared;

@@ -23,8 +23,7 @@ double share_accepted(const Composition& c, const Point& point, std::uint64_t se
 
 // 5 deviations of a share of the samples, and what the grid leaves.
 double tolerance(double share, const Integral& integral) {
-  return 5 * std::sqrt(share * (1 - share) / static_cast<double>(kCount)) + integral.error +
-         (kQuick ? 5e-3 : 5e-4);
+  return 5 * std::sqrt(share * (1 - share) / static_cast<double>(kCount)) + integral.error + (kQuick ? 5e-3 : 5e-4);
 }
 
 TEST_P(ModelIntegrals, DensityIsTheShareAccepted) {
@@ -61,16 +60,14 @@ TEST_P(ModelIntegrals, BiasedNormalisationLosesBehind) {
     std::uint64_t seed = 50;
     for (const Point& point : calm_points(unbiased)) {
       const reference::Surface s = surface_of(unbiased, point), b = surface_of(biased, point);
-      const double loss =
-          point.iz <= 0 && !sees_behind(unbiased.model)
-              ? 1
-              : reference::normaliser(s, incident(point)) / reference::normaliser(b, incident(point));
+      const double loss = point.iz <= 0 && !sees_behind(unbiased.model)
+                              ? 1
+                              : reference::normaliser(s, incident(point)) / reference::normaliser(b, incident(point));
       const Integral with = integrate(Operation::evaluate_reflection, biased, point, kSide),
                      without = integrate(Operation::evaluate_reflection, unbiased, point, kSide);
       // `ndf` normalises by nothing, samplers of unoccluded reflections by their own areas.
       const bool own = sampler == Sampler::ndf || (point.iz > 0 && !samples_normals(sampler));
-      EXPECT_NEAR(with.pdf, without.pdf * (own ? 1 : loss), with.error + without.error + 1e-5)
-          << describe(biased);
+      EXPECT_NEAR(with.pdf, without.pdf * (own ? 1 : loss), with.error + without.error + 1e-5) << describe(biased);
       EXPECT_NEAR(with.value, without.value * loss, with.error + without.error + 1e-5) << describe(biased);
       if (point.iz > 0.01f && (!GetParam().affine || loss == 1)) {
         EXPECT_EQ(with.pdf, without.pdf) << describe(biased);

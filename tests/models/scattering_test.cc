@@ -63,10 +63,10 @@ TEST_P(ModelScattering, IntegralsAreTheSharesAndMeans) {
     for (const bool forced : {false, true}) {
       const Composition c = glass(GetParam(), sampler, Transport::importance);
       for (const Point& point : glasses(c)) {
-        const Integral integral = integrate(
-            forced ? Operation::evaluate_transmission : Operation::evaluate_scattering, c, point, kSide);
-        const Mean mean = mean_of(draw(forced ? Operation::sample_transmission : Operation::sample_scattering,
-                                       c, point, kCount, 5));
+        const Integral integral =
+            integrate(forced ? Operation::evaluate_transmission : Operation::evaluate_scattering, c, point, kSide);
+        const Mean mean =
+            mean_of(draw(forced ? Operation::sample_transmission : Operation::sample_scattering, c, point, kCount, 5));
         EXPECT_LE(integral.error, kQuick ? 0.05 : 0.01) << describe(c) << describe(point);
         const double share = mean.accepted;
         EXPECT_NEAR(integral.pdf, share,
@@ -136,9 +136,7 @@ ChiSquare test_scattering(const Composition& c, const Point& point, const Point&
       sum += part;
     }
   }
-  const auto cell = [&](int event, int n) {
-    return (event * kGroups + of[0][n / kSide]) * kGroups + of[1][n % kSide];
-  };
+  const auto cell = [&](int event, int n) { return (event * kGroups + of[0][n / kSide]) * kGroups + of[1][n % kSide]; };
   std::vector<double> expected(2 * kGroups * kGroups + 1);
   std::vector<std::uint64_t> counts(expected.size());
   double sum = 0;
@@ -181,8 +179,8 @@ TEST_P(ModelScattering, SamplesFollowTheDensity) {
         const ChiSquare test = test_scattering(c, points[n], points[n], forced, 50 + n);
         smallest = std::min(smallest, test.p_value);
         EXPECT_GE(test.p_value, sidak(kAnyFailure, kTests))
-            << "chi-square " << test.statistic << " at " << test.degrees
-            << " degrees: " << (forced ? "forced " : "") << describe(c) << describe(points[n]);
+            << "chi-square " << test.statistic << " at " << test.degrees << " degrees: " << (forced ? "forced " : "")
+            << describe(c) << describe(points[n]);
       }
     }
   RecordProperty("smallest_p_value", std::to_string(smallest));
@@ -209,8 +207,7 @@ TEST_P(ModelScattering, WrongIndicesAreRefused) {
 double change(const Composition& c, const Point& point, Vector o) {
   const reference::Surface s = surface_of(c, point);
   const Vector i = incident(point);
-  const double pdf = reference::pdf_scattering(s, c.sampler, i, o),
-               value = reference::evaluate_scattering(s, i, o);
+  const double pdf = reference::pdf_scattering(s, c.sampler, i, o), value = reference::evaluate_scattering(s, i, o);
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
     double largest = 0;
@@ -234,8 +231,7 @@ TEST_P(ModelScattering, SamplesAgreeWithQueries) {
     c.model.transport = ++seed % 2 ? Transport::radiance : Transport::importance;
     std::vector<Point> points;
     for (const Point& calm : glasses(c))
-      for (const Point& p : with_random(calm, kQuick ? 16 : 256, seed * 10 + points.size()))
-        points.push_back(p);
+      for (const Point& p : with_random(calm, kQuick ? 16 : 256, seed * 10 + points.size())) points.push_back(p);
     const std::vector<Result> samples = run_points(Operation::sample_scattering, c, points);
     for (std::size_t n = 0; n < points.size(); ++n) {
       points[n].ox = samples[n].ox;
@@ -255,38 +251,33 @@ TEST_P(ModelScattering, SamplesAgreeWithQueries) {
       const bool below = sample.event == static_cast<int>(Event::transmission);
       ASSERT_EQ(below, sample.oz < 0) << describe(c) << describe(points[n]);
       const float eta2 = points[n].eta * points[n].eta;
-      ASSERT_EQ(sample.eta_scale, below && c.model.transport == Transport::radiance ? eta2 : 1)
-          << describe(c);
+      ASSERT_EQ(sample.eta_scale, below && c.model.transport == Transport::radiance ? eta2 : 1) << describe(c);
       if (sample.weight == 0 || query.value == 0) {
-        ASSERT_LE(std::max(sample.weight * sample.pdf, query.value), 1e-12)
-            << describe(c) << describe(points[n]);
+        ASSERT_LE(std::max(sample.weight * sample.pdf, query.value), 1e-12) << describe(c) << describe(points[n]);
         continue;
       }
       if (std::abs(sample.oz) < 1e-4f || points[n].iz + sample.oz * (below ? -10 : 1) < 1e-4f) continue;
       const Vector i = incident(points[n]);
-      const HalfVector half = half_vector(c, points[n], !below && c.model.retro ? turned(i) : i,
-                                          {sample.mx, sample.my, sample.mz});
+      const HalfVector half =
+          half_vector(c, points[n], !below && c.model.retro ? turned(i) : i, {sample.mx, sample.my, sample.mz});
       const double moves = change(c, points[n], outgoing(points[n])) * (1 + half.turn) + half.im;
       if (!(moves * kUnit < 0.01)) continue;
       ++compared;
       const double error = std::abs(query.pdf / sample.pdf - 1) / kUnit;
       errors.push_back(error);
       worst = std::max(worst, (error - 64) / moves);
-      ASSERT_LE(error, 128 + 24 * moves)
-          << "pdf " << sample.pdf << ", query " << query.pdf << ": " << describe(c) << describe(points[n])
-          << " event " << int{sample.event};
-      ASSERT_NEAR(query.branch, sample.branch, (128 + 24 * moves) * kUnit)
-          << describe(c) << describe(points[n]);
+      ASSERT_LE(error, 128 + 24 * moves) << "pdf " << sample.pdf << ", query " << query.pdf << ": " << describe(c)
+                                         << describe(points[n]) << " event " << int{sample.event};
+      ASSERT_NEAR(query.branch, sample.branch, (128 + 24 * moves) * kUnit) << describe(c) << describe(points[n]);
       ASSERT_LE(std::abs(query.value / (static_cast<double>(sample.weight) * query.pdf) - 1) / kUnit,
                 128 + 8 / std::abs(sample.oz) + 24 * moves)
-          << "weight " << sample.weight << ", value " << query.value << ", pdf " << query.pdf << ": "
-          << describe(c) << describe(points[n]) << " event " << int{sample.event};
-      ASSERT_NEAR(sample.ox * sample.ox + sample.oy * sample.oy + sample.oz * sample.oz, 1, 1e-5)
-          << describe(c);
+          << "weight " << sample.weight << ", value " << query.value << ", pdf " << query.pdf << ": " << describe(c)
+          << describe(points[n]) << " event " << int{sample.event};
+      ASSERT_NEAR(sample.ox * sample.ox + sample.oy * sample.oy + sample.oz * sample.oz, 1, 1e-5) << describe(c);
     }
   }
-  std::printf("%-22s %zu of %zu samples, beyond at most %.2f of o's rounding\n", name(GetParam()).c_str(),
-              compared, drawn, worst);
+  std::printf("%-22s %zu of %zu samples, beyond at most %.2f of o's rounding\n", name(GetParam()).c_str(), compared,
+              drawn, worst);
   EXPECT_GT(compared, drawn / 2);
 }
 
@@ -301,8 +292,7 @@ TEST_P(ModelScattering, TransportsDifferByEtaSquared) {
       const std::vector<Result> a = run_points(operation, radiance, points),
                                 b = run_points(operation, importance, points);
       for (std::size_t n = 0; n < points.size(); ++n) {
-        const bool sampled =
-            operation == Operation::sample_scattering || operation == Operation::sample_transmission;
+        const bool sampled = operation == Operation::sample_scattering || operation == Operation::sample_transmission;
         const bool below = (sampled ? a[n].oz : points[n].oz) < 0;
         const double eta2 = below ? static_cast<double>(points[n].eta) * points[n].eta : 1;
         ASSERT_EQ(a[n].pdf, b[n].pdf) << describe(points[n]);
@@ -348,8 +338,7 @@ TEST_P(ModelScattering, EtaOfOneIsSmooth) {
       std::vector<Point> points = scattering_points(c, 256, 17);
       for (Point& p : points) p.eta = 1;
       const std::vector<Result> results = run_points(operation, c, points);
-      const bool sampled =
-          operation == Operation::sample_scattering || operation == Operation::sample_transmission;
+      const bool sampled = operation == Operation::sample_scattering || operation == Operation::sample_transmission;
       for (std::size_t n = 0; n < points.size(); ++n) {
         const Result& r = results[n];
         ASSERT_EQ(r.status, static_cast<int>(LaneStatus::smooth)) << describe(points[n]);
@@ -379,8 +368,7 @@ TEST_P(ModelScattering, EtaNearOneIsFinite) {
       for (std::size_t n = 0; n < points.size(); ++n) {
         const Result& r = results[n];
         ASSERT_TRUE(std::isfinite(r.pdf) && r.pdf >= 0) << r.pdf << describe(c) << describe(points[n]);
-        ASSERT_TRUE(std::isfinite(r.weight) && r.weight >= 0)
-            << r.weight << describe(c) << describe(points[n]);
+        ASSERT_TRUE(std::isfinite(r.weight) && r.weight >= 0) << r.weight << describe(c) << describe(points[n]);
         if (!accepted(r)) continue;
         if (sampler != Sampler::ndf) {
           ASSERT_LE(r.weight, 1 + 1e-4) << describe(c) << describe(points[n]);
@@ -388,12 +376,10 @@ TEST_P(ModelScattering, EtaNearOneIsFinite) {
         ASSERT_NEAR(r.ox * r.ox + r.oy * r.oy + r.oz * r.oz, 1, 1e-5) << describe(c) << describe(points[n]);
         set_outgoing(points[n], {r.ox, r.oy, r.oz});
       }
-      for (const Result& r :
-           run_points(operation == Operation::sample_scattering ? Operation::evaluate_scattering
-                                                                : Operation::evaluate_transmission,
-                      c, points))
-        ASSERT_TRUE(std::isfinite(r.pdf) && std::isfinite(r.value) && r.pdf >= 0 && r.value >= 0)
-            << describe(c);
+      for (const Result& r : run_points(operation == Operation::sample_scattering ? Operation::evaluate_scattering
+                                                                                  : Operation::evaluate_transmission,
+                                        c, points))
+        ASSERT_TRUE(std::isfinite(r.pdf) && std::isfinite(r.value) && r.pdf >= 0 && r.value >= 0) << describe(c);
     }
 }
 

@@ -50,8 +50,7 @@ TEST_P(ModelUnoccluded, WeightsVaryLessThanRejection) {
   int number = 0;
   for (const Point& point : calm_points(c)) {
     if (point.iz <= 0) continue;
-    const std::vector<Result> samples =
-        draw(Operation::sample_reflection, c, point, kQuick ? 10'000 : 200'000, ++seed);
+    const std::vector<Result> samples = draw(Operation::sample_reflection, c, point, kQuick ? 10'000 : 200'000, ++seed);
     std::vector<Point> points(samples.size(), point);
     for (std::size_t n = 0; n < points.size(); ++n) {
       points[n].ox = samples[n].ox;
@@ -73,8 +72,8 @@ TEST_P(ModelUnoccluded, WeightsVaryLessThanRejection) {
     Statistics statistics;
     draw(Operation::sample_reflection, visible, point, kQuick ? 10'000 : 200'000, ++seed, &statistics);
     const double kept = static_cast<double>(statistics.accepted) / static_cast<double>(statistics.lanes());
-    std::printf("%-22s theta %5.1f: relative second moment %.4f, of rejection %.4f\n",
-                name(GetParam()).c_str(), std::acos(point.iz) * 180 / 3.14159265, moment, 1 / kept);
+    std::printf("%-22s theta %5.1f: relative second moment %.4f, of rejection %.4f\n", name(GetParam()).c_str(),
+                std::acos(point.iz) * 180 / 3.14159265, moment, 1 / kept);
     const std::string key = "_of_point_" + std::to_string(number++);
     RecordProperty("second_moment" + key, std::to_string(moment));
     RecordProperty("second_moment_of_rejection" + key, std::to_string(1 / kept));

@@ -156,8 +156,8 @@ class Comparison {
       std::printf(
           "%-34s %-16s %9zu lanes: median %.2f, 99.9 %% %.1f, worst %.3g units of 2^-24; %zu above %.0f, "
           "at most %.2f times what rounding explains\n",
-          title_.c_str(), kNames[bounds_[n].quantity], row.errors.size(), median, at(0.999), row.worst,
-          row.above, bounds_[n].floor, row.worst_ratio);
+          title_.c_str(), kNames[bounds_[n].quantity], row.errors.size(), median, at(0.999), row.worst, row.above,
+          bounds_[n].floor, row.worst_ratio);
       std::printf("    worst at %s\n", text(row.worst_lane).c_str());
       EXPECT_LE(median, bounds_[n].median) << title_ << " " << kNames[bounds_[n].quantity];
     }
@@ -204,17 +204,15 @@ class Comparison {
 
   static std::string text(const Lane& lane) {
     char buffer[400];
-    std::snprintf(buffer, sizeof buffer,
-                  "i (%.9g, %.9g, %.9g) alpha %.9g %.9g u %.9g %.9g %.9g o (%.9g, %.9g, %.9g)", lane[kIx],
-                  lane[kIy], lane[kIz], lane[kAlphaX], lane[kAlphaY], lane[kU1], lane[kU2], lane[kU3],
+    std::snprintf(buffer, sizeof buffer, "i (%.9g, %.9g, %.9g) alpha %.9g %.9g u %.9g %.9g %.9g o (%.9g, %.9g, %.9g)",
+                  lane[kIx], lane[kIy], lane[kIz], lane[kAlphaX], lane[kAlphaY], lane[kU1], lane[kU2], lane[kU3],
                   lane[kOx], lane[kOy], lane[kOz]);
     return buffer;
   }
 
   void report(const Lane& lane, const char* what, double error) {
     if (++unexplained_ <= 5)
-      ADD_FAILURE() << title_ << ": " << what << " off by " << error << " units, unexplained, at "
-                    << text(lane);
+      ADD_FAILURE() << title_ << ": " << what << " off by " << error << " units, unexplained, at " << text(lane);
   }
 
   std::string title_;
@@ -286,8 +284,8 @@ class Accuracy : public testing::TestWithParam<Sampler> {};
 
 TEST_P(Accuracy, SampleReflection) {
   const auto truth = [&](const Lane& lane) {
-    const auto s = reference::sample_reflection({}, GetParam(), alpha_of(lane), i_of(lane), lane[kU1],
-                                                lane[kU2], lane[kU3]);
+    const auto s =
+        reference::sample_reflection({}, GetParam(), alpha_of(lane), i_of(lane), lane[kU1], lane[kU2], lane[kU3]);
     Answer answer{};
     answer.vector[kO] = s.o;
     answer.vector[kM] = s.m;
@@ -305,8 +303,7 @@ class AccuracyOfNormals : public testing::TestWithParam<Sampler> {};
 
 TEST_P(AccuracyOfNormals, SampleNormal) {
   const auto truth = [&](const Lane& lane) {
-    const auto s =
-        reference::sample_normal(GetParam(), alpha_of(lane), i_of(lane), lane[kU1], lane[kU2], lane[kU3]);
+    const auto s = reference::sample_normal(GetParam(), alpha_of(lane), i_of(lane), lane[kU1], lane[kU2], lane[kU3]);
     Answer answer{};
     answer.vector[kM] = s.m;
     answer.scalar[kIm] = s.incident_dot_normal;
@@ -340,8 +337,7 @@ TEST_P(Accuracy, EvaluateAndPdf) {
 INSTANTIATE_TEST_SUITE_P(Samplers, Accuracy, testing::ValuesIn(all_samplers().begin(), all_samplers().end()),
                          [](const auto& info) { return std::string(name(info.param)); });
 
-INSTANTIATE_TEST_SUITE_P(Samplers, AccuracyOfNormals,
-                         testing::Values(Sampler::ndf, Sampler::heitz, Sampler::cap),
+INSTANTIATE_TEST_SUITE_P(Samplers, AccuracyOfNormals, testing::Values(Sampler::ndf, Sampler::heitz, Sampler::cap),
                          [](const auto& info) { return std::string(name(info.param)); });
 
 TEST(AccuracyOfAll, EvaluateReflection) {

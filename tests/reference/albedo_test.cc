@@ -30,8 +30,7 @@ TEST_P(Albedo, IsTheMeanWeight) {
       model.shadowing = shadowing;
       const double albedo = integrate(
           {alpha, i},
-          [&](const Vector&, const Vector& o) { return reference::evaluate_reflection(model, alpha, i, o); },
-          1e-8);
+          [&](const Vector&, const Vector& o) { return reference::evaluate_reflection(model, alpha, i, o); }, 1e-8);
       double sum = 0, squares = 0;
       draw({.sampler = GetParam(), .model = model, .alpha = alpha, .i = i, .seed = 11 + n, .count = count},
            [&](const Drawn& sample) {
@@ -39,8 +38,8 @@ TEST_P(Albedo, IsTheMeanWeight) {
              squares += static_cast<double>(sample.weight) * sample.weight;
            });
       const double mean = sum / static_cast<double>(count);
-      const double deviation = std::sqrt(std::max(0.0, squares / static_cast<double>(count) - mean * mean) /
-                                         static_cast<double>(count));
+      const double deviation =
+          std::sqrt(std::max(0.0, squares / static_cast<double>(count) - mean * mean) / static_cast<double>(count));
       // 5 deviations, and float's rounding where the weight hardly varies.
       EXPECT_NEAR(mean, albedo, 5 * deviation + 1e-6);
       EXPECT_LE(albedo, 1 + 1e-7);

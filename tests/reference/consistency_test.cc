@@ -90,20 +90,18 @@ TEST_P(Consistency, SampledPdfIsThePdf) {
     worst_ratio = std::max(worst_ratio, (difference - 32) / moves);
     // f cos(theta_o) / pdf is the weight, up to the same and to what o_z's rounding makes of the shadowing.
     const double from_value = value[n] / again[n];
-    worst_value =
-        std::max(worst_value, std::abs(from_value / weight[n] - 1) / kUnit / (64 + 8 / o[2][n] + moves));
+    worst_value = std::max(worst_value, std::abs(from_value / weight[n] - 1) / kUnit / (64 + 8 / o[2][n] + moves));
   }
   std::nth_element(differences.begin(), differences.begin() + differences.size() / 2, differences.end());
   std::printf("%s: %zu lanes, median %.2f, worst %.3g units of 2^-24; at most %.2f units of o's rounding\n",
-              std::string(name(GetParam())).c_str(), differences.size(), differences[differences.size() / 2],
-              worst, worst_ratio);
+              std::string(name(GetParam())).c_str(), differences.size(), differences[differences.size() / 2], worst,
+              worst_ratio);
   EXPECT_GT(differences.size(), kLanes / 10);
   EXPECT_LE(worst_ratio, 24);
   EXPECT_LE(worst_value, 1) << "value / pdf is not the weight";
 }
 
-INSTANTIATE_TEST_SUITE_P(Samplers, Consistency,
-                         testing::ValuesIn(all_samplers().begin(), all_samplers().end()),
+INSTANTIATE_TEST_SUITE_P(Samplers, Consistency, testing::ValuesIn(all_samplers().begin(), all_samplers().end()),
                          [](const auto& info) { return std::string(name(info.param)); });
 
 }  // namespace

@@ -19,8 +19,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 std::vector<Surface> surfaces() {
   std::vector<Surface> all;
   for (Distribution d : kDistributions) {
-    for (reference::Roughness alpha :
-         {reference::Roughness{0.1, 0.1}, {0.4, 0.4}, {1, 1}, {0.08, 0.6}, {0.9, 0.2}}) {
+    for (reference::Roughness alpha : {reference::Roughness{0.1, 0.1}, {0.4, 0.4}, {1, 1}, {0.08, 0.6}, {0.9, 0.2}}) {
       Surface s;
       s.model.distribution = d;
       s.alpha = alpha;
@@ -129,8 +128,7 @@ TEST(Definition, VcavityHits) {
 TEST(Definition, AreasOfOppositeDirections) {
   for (const Surface& s : surfaces()) {
     const Vector i = direction(75, 25), back = {-i.x, -i.y, -i.z};
-    EXPECT_NEAR(reference::projected_area(s, i) - reference::projected_area(s, back), stretched(s, i).z,
-                1e-11);
+    EXPECT_NEAR(reference::projected_area(s, i) - reference::projected_area(s, back), stretched(s, i).z, 1e-11);
   }
 }
 

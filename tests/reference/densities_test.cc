@@ -18,8 +18,8 @@ using reference::Roughness;
 
 const std::vector<double> kThetas =
     kQuick ? std::vector<double>{60} : std::vector<double>{0, 60, 85, 89.9, 90, 92, 150};
-const std::vector<Roughness> kAlphas = kQuick ? std::vector<Roughness>{{1.0, 0.3}}
-                                              : std::vector<Roughness>{{0.15, 0.15}, {0.7, 0.7}, {1.0, 0.3}};
+const std::vector<Roughness> kAlphas =
+    kQuick ? std::vector<Roughness>{{1.0, 0.3}} : std::vector<Roughness>{{0.15, 0.15}, {0.7, 0.7}, {1.0, 0.3}};
 
 Surface surface(Distribution distribution, Masking masking, Roughness alpha) {
   Surface s;
@@ -86,8 +86,7 @@ Vector reflection(Vector i, Vector m, double im) {
 }
 
 // Integral over o of a density or value of reflections.
-double over_reflections(const Surface& s, Vector i, const std::function<double(Vector)>& f,
-                        bool of_values = false) {
+double over_reflections(const Surface& s, Vector i, const std::function<double(Vector)>& f, bool of_values = false) {
   return over_normals(
       s, i,
       [&](Vector m, double im) {
@@ -107,8 +106,8 @@ TEST(Densities, VisibleNormalsIntegrateToOne) {
   for (const Surface& s : all) {
     for (double theta : kThetas) {
       const Vector i = direction(theta, 35);
-      const double sum = over_normals(
-          s, i, [&](Vector m, double) { return reference::pdf_normal(s, Sampler::visible, i, m); });
+      const double sum =
+          over_normals(s, i, [&](Vector m, double) { return reference::pdf_normal(s, Sampler::visible, i, m); });
       EXPECT_NEAR(sum, sees_nothing(s, i) ? 0 : 1, 1e-6) << describe(s, i);
     }
   }
@@ -119,8 +118,7 @@ TEST(Densities, ReflectionsIntegrateToTheShareUnoccluded) {
     for (double theta : kThetas) {
       const Vector i = direction(theta, 35);
       if (sees_nothing(s, i)) continue;
-      EXPECT_NEAR(over_pdf(s, Sampler::visible, i), reference::share_unoccluded(s, i), 2e-6)
-          << describe(s, i);
+      EXPECT_NEAR(over_pdf(s, Sampler::visible, i), reference::share_unoccluded(s, i), 2e-6) << describe(s, i);
     }
   }
 }
@@ -167,8 +165,7 @@ TEST(Densities, NdfNormals) {
       const double derivative = (reference::projected_area(s, {i.x, i.y, i.z + step}) -
                                  reference::projected_area(s, {i.x, i.y, i.z - step})) /
                                 (2 * step);
-      EXPECT_NEAR(facing, derivative, s.model.distribution == Distribution::phong ? 1e-4 : 2e-6)
-          << describe(s, i);
+      EXPECT_NEAR(facing, derivative, s.model.distribution == Distribution::phong ? 1e-4 : 2e-6) << describe(s, i);
     }
   }
 }
@@ -182,8 +179,7 @@ TEST(Densities, AgreeWithTheGgxReference) {
       EXPECT_NEAR(reference::share_unoccluded(s, i), reference::share_unoccluded(alpha, i), 1e-13);
       for (double out : {5.0, 50.0, 88.0}) {
         const Vector o = direction(out, 190);
-        for (Sampler sampler :
-             {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact}) {
+        for (Sampler sampler : {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact}) {
           const double p = reference::pdf_reflection(sampler, alpha, i, o);
           EXPECT_NEAR(reference::pdf_reflection(s, sampler, i, o), p, 1e-12 * p) << name(sampler);
         }
@@ -202,8 +198,7 @@ TEST(Values, AlbedoIsTheIntegralAndAtMostOne) {
   for (Surface s : models()) {
     for (Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated}) {
       s.model.shadowing = shadowing;
-      if (s.model.masking == Masking::vcavity && shadowing == Shadowing::uncorrelated)
-        continue;  // no part there
+      if (s.model.masking == Masking::vcavity && shadowing == Shadowing::uncorrelated) continue;  // no part there
       for (double theta : kQuick ? std::vector<double>{60} : std::vector<double>{0, 60, 89.9, 110}) {
         const Vector i = direction(theta, 35);
         const double albedo = reference::albedo(s, i);
@@ -338,8 +333,7 @@ TEST(Transmission, DensitiesIntegrateToTheShareAccepted) {
         });
         const double sum =
             over_half_sphere(-1, [&](Vector o) { return reference::pdf_transmission(s, sampler, i, o); });
-        EXPECT_NEAR(sum, share, kQuick ? 1e-2 : 2e-3)
-            << describe(s, i) << " eta " << s.eta << " " << name(sampler);
+        EXPECT_NEAR(sum, share, kQuick ? 1e-2 : 2e-3) << describe(s, i) << " eta " << s.eta << " " << name(sampler);
       }
     }
   }
@@ -355,9 +349,8 @@ TEST(Transmission, ScatteringIntegratesToTheShareThatGoesSomewhere) {
         const bool reflects = reflection(i, m, im).z > 0;
         const bool transmits = refract(s.eta, i, m, im, o) && o.z < 0;
         if (im < 1e-9) return 0.0;  // the scalar product is rounding
-        EXPECT_NEAR(
-            reference::branch_probability(s, i, m, true) + reference::branch_probability(s, i, m, false),
-            reflects || transmits ? 1 : 0, 1e-12);
+        EXPECT_NEAR(reference::branch_probability(s, i, m, true) + reference::branch_probability(s, i, m, false),
+                    reflects || transmits ? 1 : 0, 1e-12);
         return reflects || transmits ? reference::pdf_normal(s, Sampler::visible, i, m) : 0;
       });
       const auto pdf = [&](Vector o) { return reference::pdf_scattering(s, Sampler::visible, i, o); };

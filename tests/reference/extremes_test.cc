@@ -22,18 +22,10 @@ class Fuzz {
     const double phi = 2 * std::numbers::pi * uniform(), sign = uniform() < 0.7 ? 1 : -1;
     double z = 0;
     switch (below(4)) {
-      case 0:
-        z = uniform();
-        break;
-      case 1:
-        z = log_uniform(1e-30, 1);
-        break;
-      case 2:
-        z = std::sqrt(1 - log_uniform(1e-30, 1));
-        break;
-      default:
-        z = below(2);
-        break;
+      case 0: z = uniform(); break;
+      case 1: z = log_uniform(1e-30, 1); break;
+      case 2: z = std::sqrt(1 - log_uniform(1e-30, 1)); break;
+      default: z = below(2); break;
     }
     const double r = std::sqrt((1 - z) * (1 + z));
     return {r * std::cos(phi), r * std::sin(phi), sign * z};
@@ -79,8 +71,7 @@ TEST(Extremes, EverythingIsFiniteAndNotNegative) {
       const Vector reflected = {2 * im * m.x - i.x, 2 * im * m.y - i.y, 2 * im * m.z - i.z};
       o = unit(reflected);
     }
-    SCOPED_TRACE(describe(s, i) + " o " + std::to_string(o.x) + " " + std::to_string(o.y) + " " +
-                 std::to_string(o.z));
+    SCOPED_TRACE(describe(s, i) + " o " + std::to_string(o.x) + " " + std::to_string(o.y) + " " + std::to_string(o.z));
     const auto check = [&](const char* what, double value) {
       EXPECT_TRUE(std::isfinite(value) && value >= 0) << what << " " << value;
     };

@@ -27,8 +27,7 @@ double share_accepted(Sampler sampler, Roughness alpha, Vector i) {
   if (i.z <= 0) return 1;
   const double sigma = reference::projected_area(alpha, i), k = reference::share_unoccluded(alpha, i) * sigma;
   if (sampler == Sampler::exact) return 1;
-  if (sampler == Sampler::bounded)
-    return k / ((reference::bounded_k(alpha, i) * i.z + length_stretched(alpha, i)) / 2);
+  if (sampler == Sampler::bounded) return k / ((reference::bounded_k(alpha, i) * i.z + length_stretched(alpha, i)) / 2);
   return k / sigma;
 }
 
@@ -101,8 +100,7 @@ TEST_P(Integrals, ProjectedAreaAndShareUnoccluded) {
   const double scale = 1 / sigma;
   const Integrand density = [&](const Vector& m, const Vector& o) { return scale * visible(m, o); };
   EXPECT_NEAR(integrate({alpha(), i(), false}, density), 1, 1e-8) << "projected area";
-  const double share =
-      integrate({.alpha = alpha(), .i = i(), .reflections = true, .per_normal = true}, density);
+  const double share = integrate({.alpha = alpha(), .i = i(), .reflections = true, .per_normal = true}, density);
   EXPECT_NEAR(share, reference::share_unoccluded(alpha(), i()), 1e-6) << "K / sigma";
 
   // The kernel's, to float accuracy.

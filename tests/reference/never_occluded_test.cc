@@ -29,13 +29,11 @@ TEST(Exact, IsNeverOccluded) {
     batch.sampler = Sampler::exact;
     batch.lanes = kSamples;
     batch.incident = {static_cast<float>(std::sin(theta) * std::cos(phi)),
-                      static_cast<float>(std::sin(theta) * std::sin(phi)),
-                      static_cast<float>(std::cos(theta))};
+                      static_cast<float>(std::sin(theta) * std::sin(phi)), static_cast<float>(std::cos(theta))};
     const float ax = alpha(), ay = alpha();
     batch.alpha_x = ax;
     batch.alpha_y = n % 2 == 0 ? ax : ay;
-    batch.generator =
-        Generator{.seed = static_cast<std::uint64_t>(n), .dimension = 0, .id = {}, .first_id = 0};
+    batch.generator = Generator{.seed = static_cast<std::uint64_t>(n), .dimension = 0, .id = {}, .first_id = 0};
     batch.out.outgoing.z = oz;
     const auto statistics = sample_reflection(batch);
     ASSERT_TRUE(statistics.ok()) << statistics.status();

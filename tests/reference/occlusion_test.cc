@@ -22,15 +22,13 @@ Vector at(double degrees) {
 }
 
 double occluded_by_quadrature(Sampler sampler, Roughness alpha, Vector i) {
-  return 1 - integrate({alpha, i}, [&](const Vector&, const Vector& o) {
-           return reference::pdf_reflection(sampler, alpha, i, o);
-         });
+  return 1 - integrate({alpha, i},
+                       [&](const Vector&, const Vector& o) { return reference::pdf_reflection(sampler, alpha, i, o); });
 }
 
 double occluded_by_count(Sampler sampler, Roughness alpha, Vector i, std::uint64_t count) {
   const Statistics statistics =
-      draw({.sampler = sampler, .model = {}, .alpha = alpha, .i = i, .seed = 3, .count = count},
-           [](const Drawn&) {});
+      draw({.sampler = sampler, .model = {}, .alpha = alpha, .i = i, .seed = 3, .count = count}, [](const Drawn&) {});
   return static_cast<double>(statistics.occluded) / static_cast<double>(statistics.lanes());
 }
 
@@ -46,16 +44,15 @@ TEST(Occlusion, SharesBySampler) {
     double ndf, cap, bounded;
   };
   const Row rows[] = {
-      {0, {1, 1}, .5000, .5000, 0},        {30, {.5, .5}, .2276, .1951, .0522},
-      {60, {.3, 1}, .3850, .3014, .2684},  {60, {.02, .9}, .2575, .2569, .2567},
-      {89, {.5, .5}, .4935, .0086, .0002},
+      {0, {1, 1}, .5000, .5000, 0},         {30, {.5, .5}, .2276, .1951, .0522}, {60, {.3, 1}, .3850, .3014, .2684},
+      {60, {.02, .9}, .2575, .2569, .2567}, {89, {.5, .5}, .4935, .0086, .0002},
   };
   const std::uint64_t count = kQuick ? 20'000 : 4'000'000;
   for (const Row& row : rows) {
     const double expected[] = {row.ndf, row.cap, row.bounded, 0};
     for (int n = 0; n < 4; ++n) {
-      SCOPED_TRACE(testing::Message() << name(kSamplers[n]) << " theta " << row.theta << " alpha "
-                                      << row.alpha.x << " " << row.alpha.y);
+      SCOPED_TRACE(testing::Message() << name(kSamplers[n]) << " theta " << row.theta << " alpha " << row.alpha.x << " "
+                                      << row.alpha.y);
       const double share = occluded_by_quadrature(kSamplers[n], row.alpha, at(row.theta));
       EXPECT_NEAR(share, expected[n], 0.5e-4 + 1e-9);
       const double counted = occluded_by_count(kSamplers[n], row.alpha, at(row.theta), count);

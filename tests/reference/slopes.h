@@ -71,8 +71,8 @@ double doubling(const F& f, double a, double b, double scale, int count = 20) {
 // Standard slopes to the normal M with M_z = 1.
 inline Vector normal(const Surface& s, double x, double y) {
   const double rho = s.slope_correlation;
-  return {-(s.mean_slope_x + s.alpha.x * x),
-          -(s.mean_slope_y + s.alpha.y * (rho * x + std::sqrt(1 - rho * rho) * y)), 1};
+  return {-(s.mean_slope_x + s.alpha.x * x), -(s.mean_slope_y + s.alpha.y * (rho * x + std::sqrt(1 - rho * rho) * y)),
+          1};
 }
 inline double determinant(const Surface& s) {
   return s.alpha.x * s.alpha.y * std::sqrt(1 - s.slope_correlation * s.slope_correlation);
@@ -90,8 +90,7 @@ inline Vector stretched(const Surface& s, Vector i) {
 
 // How fast the density falls beyond r, at the fastest.
 inline double falls_over(const Surface& s, double r) {
-  const bool power =
-      s.model.distribution == Distribution::ggx || s.model.distribution == Distribution::student_t;
+  const bool power = s.model.distribution == Distribution::ggx || s.model.distribution == Distribution::student_t;
   return power ? 1 + std::abs(r) : 1 / (1 + 2 * std::abs(r));
 }
 
@@ -137,8 +136,7 @@ double over_normals(const Surface& s, Vector i, const F& f, bool of_values = fal
       // 2 m_z o_z = i.m, and o_z = i_z.
       for (bool equal : {false, true}) {
         const auto kink = [&](double r) {
-          const double x = centre.x + r * d.x, y = centre.y + r * d.y, l2 = 1 + x * x + y * y,
-                       im = w.z - r * d.z;
+          const double x = centre.x + r * d.x, y = centre.y + r * d.y, l2 = 1 + x * x + y * y, im = w.z - r * d.z;
           return equal ? im - i.z * l2 : 4 * im - 2 * i.z * l2 - im * l2;
         };
         for (int n = 0; n < 64; ++n) {
@@ -170,9 +168,7 @@ double over_normals(const Surface& s, Vector i, const F& f, bool of_values = fal
     const double scale = phong ? 1 : falls_over(s, from);
     const int panels = phong ? 10 : 4;
     for (int n = 0; n < panels; ++n) {
-      const auto mapped = [&](double v) {
-        return at(from + scale * v / (1 - v)) * scale / ((1 - v) * (1 - v));
-      };
+      const auto mapped = [&](double v) { return at(from + scale * v / (1 - v)) * scale / ((1 - v) * (1 - v)); };
       sum += panel(mapped, static_cast<double>(n) / panels, (n + 1.0) / panels, 12);
     }
     return sum;
@@ -196,8 +192,7 @@ double over_normals(const Surface& s, Vector i, const F& f, bool of_values = fal
       double low = 4 * quarter * n / count, high = 4 * quarter * (n + 1) / count;
       const bool sign = discriminant(low) > 0;
       if (sign == (discriminant(high) > 0)) continue;
-      for (int k = 0; k < 60; ++k)
-        ((discriminant((low + high) / 2) > 0) == sign ? low : high) = (low + high) / 2;
+      for (int k = 0; k < 60; ++k) ((discriminant((low + high) / 2) > 0) == sign ? low : high) = (low + high) / 2;
       cut(low);
     }
     const Vector x = step(phi), y = step(phi + quarter);
@@ -212,18 +207,16 @@ double over_normals(const Surface& s, Vector i, const F& f, bool of_values = fal
   for (std::size_t n = 0; n + 1 < cuts.size(); ++n) {
     const double middle = (cuts[n] + cuts[n + 1]) / 2, half = middle - cuts[n];
     if (half < 1e-12) continue;
-    sum +=
-        doubling(along, cuts[n], middle, half / 256, 7) + doubling(along, cuts[n + 1], middle, half / 256, 7);
+    sum += doubling(along, cuts[n], middle, half / 256, 7) + doubling(along, cuts[n + 1], middle, half / 256, 7);
   }
   return sum;
 }
 
 inline std::string describe(const Surface& s, Vector i) {
   return std::string(name(s.model.distribution)) + " " + std::string(name(s.model.masking)) + " alpha " +
-         std::to_string(s.alpha.x) + " " + std::to_string(s.alpha.y) + " mean " +
-         std::to_string(s.mean_slope_x) + " " + std::to_string(s.mean_slope_y) + " rho " +
-         std::to_string(s.slope_correlation) + " i " + std::to_string(i.x) + " " + std::to_string(i.y) + " " +
-         std::to_string(i.z);
+         std::to_string(s.alpha.x) + " " + std::to_string(s.alpha.y) + " mean " + std::to_string(s.mean_slope_x) + " " +
+         std::to_string(s.mean_slope_y) + " rho " + std::to_string(s.slope_correlation) + " i " + std::to_string(i.x) +
+         " " + std::to_string(i.y) + " " + std::to_string(i.z);
 }
 
 }  // namespace facetwise::test::slopes

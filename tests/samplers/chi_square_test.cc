@@ -63,10 +63,10 @@ TEST_P(ChiSquareTest, SamplesFollowTheDensity) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Reflections, ChiSquareTest,
-                         testing::ValuesIn(cases(Operation::sample_reflection, 1)), case_name);
-INSTANTIATE_TEST_SUITE_P(Normals, ChiSquareTest,
-                         testing::ValuesIn(cases(Operation::sample_normal, kQuick ? 2 : 3)), case_name);
+INSTANTIATE_TEST_SUITE_P(Reflections, ChiSquareTest, testing::ValuesIn(cases(Operation::sample_reflection, 1)),
+                         case_name);
+INSTANTIATE_TEST_SUITE_P(Normals, ChiSquareTest, testing::ValuesIn(cases(Operation::sample_normal, kQuick ? 2 : 3)),
+                         case_name);
 
 #ifndef FACETWISE_QUICK
 TEST(ChiSquare, CoversAtLeastSixtyConfigurations) { EXPECT_GE(configurations().size(), 60u); }

@@ -27,8 +27,7 @@ TEST_P(PowerTest, NearMissesAreRejected) {
     draw.i = incident(configuration);
     draw.seed = 1000 + n;
     draw.count = count;
-    const Verdict verdict =
-        test_hypotheses(draw, {truth(draw), modulated(draw, epsilon), rougher(draw, epsilon)});
+    const Verdict verdict = test_hypotheses(draw, {truth(draw), modulated(draw, epsilon), rougher(draw, epsilon)});
     // Behind the surface `ndf` accepts next to nothing, and a count of nothing proves nothing.
     if (verdict.share_expected < 0.05) continue;
     // Of a smooth lobe only the tail is visible from behind, and that has the same shape for every alpha.

@@ -37,8 +37,7 @@ inline v1::BatchRequest good_request(std::size_t lanes) {
   request.set_u1(floats(lanes, 0.125f));
   request.set_u2(floats(lanes, 0.75f));
   request.set_u3(floats(lanes, 0.5f));
-  for (const v1::Output output :
-       {v1::OUTGOING, v1::NORMAL, v1::INCIDENT_DOT_NORMAL, v1::PDF, v1::WEIGHT, v1::STATUS})
+  for (const v1::Output output : {v1::OUTGOING, v1::NORMAL, v1::INCIDENT_DOT_NORMAL, v1::PDF, v1::WEIGHT, v1::STATUS})
     request.add_outputs(output);
   return request;
 }

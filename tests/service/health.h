@@ -20,8 +20,7 @@ class Health {
   Status check(const std::string& service) {
     grpc::ClientContext context;
     grpc::CompletionQueue queue;
-    const auto call =
-        stub_.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check", request(service), &queue);
+    const auto call = stub_.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check", request(service), &queue);
     grpc::ByteBuffer response;
     grpc::Status status;
     call->StartCall();
@@ -74,8 +73,7 @@ class Health {
   }
   static Status parse(const grpc::ByteBuffer& response) {
     grpc::Slice slice;
-    if (!response.DumpToSingleSlice(&slice).ok() || slice.size() != 2 || slice.begin()[0] != 0x08)
-      return unknown;
+    if (!response.DumpToSingleSlice(&slice).ok() || slice.size() != 2 || slice.begin()[0] != 0x08) return unknown;
     return static_cast<Status>(slice.begin()[1]);
   }
 

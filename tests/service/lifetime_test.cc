@@ -91,13 +91,11 @@ TEST_F(Lifetime, AddressesThatCannotBeListenedOnAreRefused) {
     EXPECT_NE(server.errors().find(message), std::string::npos) << server.errors();
   };
   std::ofstream(folder_.path("file")) << "precious";
-  expect_refused({"--listen", "unix:" + folder_.path("file")},
-                 "there is a file of that name that is no socket");
+  expect_refused({"--listen", "unix:" + folder_.path("file")}, "there is a file of that name that is no socket");
   std::string text;
   std::ifstream(folder_.path("file")) >> text;
   EXPECT_EQ(text, "precious");
-  expect_refused({"--listen", "unix:" + folder_.path("no/such/folder")},
-                 "cannot make its lock file: No such file");
+  expect_refused({"--listen", "unix:" + folder_.path("no/such/folder")}, "cannot make its lock file: No such file");
   expect_refused({"--listen", "unix:/" + std::string(200, 'x')}, "is too long a path");
   expect_refused({"--listen", "unix:"}, "has no path");
   expect_refused({"--listen", "8000"}, "is neither unix:PATH nor HOST:PORT");
@@ -170,18 +168,16 @@ TEST_F(Lifetime, OutlivesClientsThatGoAway) {
     expired.set_deadline(std::chrono::system_clock::now() + std::chrono::microseconds(k * 50));
     v1::BatchResponse response;
     const grpc::Status status = stub->Run(&expired, good_request(100000), &response);
-    EXPECT_TRUE(status.ok() || status.error_code() == StatusCode::DEADLINE_EXCEEDED)
-        << status.error_message();
+    EXPECT_TRUE(status.ok() || status.error_code() == StatusCode::DEADLINE_EXCEEDED) << status.error_message();
   }
   // Connections that send something else, or nothing, and close.
-  for (const char* text : {"", "GET / HTTP/1.1\r\n\r\n",
-                           "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\xff\xff\xff\xff\xff\xff\xff\xff\xff"}) {
+  for (const char* text :
+       {"", "GET / HTTP/1.1\r\n\r\n", "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\xff\xff\xff\xff\xff\xff\xff\xff\xff"}) {
     const int connection = socket(AF_UNIX, SOCK_STREAM, 0);
     sockaddr_un address = {.sun_family = AF_UNIX, .sun_path = {}};
     std::strncpy(address.sun_path, folder_.path("s").c_str(), sizeof address.sun_path - 1);
     ASSERT_EQ(connect(connection, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    EXPECT_EQ(send(connection, text, std::strlen(text), MSG_NOSIGNAL),
-              static_cast<ssize_t>(std::strlen(text)));
+    EXPECT_EQ(send(connection, text, std::strlen(text), MSG_NOSIGNAL), static_cast<ssize_t>(std::strlen(text)));
     close(connection);
   }
   for (int k = 0; k < 20; ++k) ASSERT_TRUE(run(*stub_of(unix_address()), 1000).ok());
@@ -321,8 +317,7 @@ TEST_F(Lifetime, BenchmarksReportAsTheyGo) {
   };
   expect_invalid(benchmark("fail", 0), "filter: the runner says no");
   expect_invalid(benchmark(std::string(1001, 'x'), 0), "filter: 1001 bytes");
-  for (const double seconds : {-1.0, 10.5, std::nan("")})
-    expect_invalid(benchmark("", seconds), "min_seconds: ");
+  for (const double seconds : {-1.0, 10.5, std::nan("")}) expect_invalid(benchmark("", seconds), "min_seconds: ");
 
   // One at a time; it ends when its client goes.
   grpc::ClientContext context;

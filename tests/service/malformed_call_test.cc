@@ -54,8 +54,7 @@ class MalformedCall : public ::testing::Test {
     EXPECT_TRUE(queue.Next(&tag, &good));
     std::vector<grpc::Slice> slices;
     if (answer != nullptr && status.ok() && response.Dump(&slices).ok())
-      for (const grpc::Slice& part : slices)
-        answer->append(reinterpret_cast<const char*>(part.begin()), part.size());
+      for (const grpc::Slice& part : slices) answer->append(reinterpret_cast<const char*>(part.begin()), part.size());
     return status;
   }
 
@@ -138,23 +137,18 @@ TEST_F(MalformedCall, EveryColumn) {
 TEST_F(MalformedCall, EveryChoice) {
   const auto unknown = [&](const std::string& field, const auto& set) {
     for (const int value : {99, -1, 1 << 30})
-      expect_run_error(field + ": unknown value " + std::to_string(value),
-                       [&](v1::BatchRequest& r) { set(r, value); });
+      expect_run_error(field + ": unknown value " + std::to_string(value), [&](v1::BatchRequest& r) { set(r, value); });
   };
   unknown("operation", [](auto& r, int v) { r.set_operation(static_cast<v1::Operation>(v)); });
   unknown("sampler", [](auto& r, int v) { r.set_sampler(static_cast<v1::SamplerKind>(v)); });
   unknown("model.distribution",
           [](auto& r, int v) { r.mutable_model()->set_distribution(static_cast<v1::Distribution>(v)); });
-  unknown("model.masking",
-          [](auto& r, int v) { r.mutable_model()->set_masking(static_cast<v1::Masking>(v)); });
-  unknown("model.shadowing",
-          [](auto& r, int v) { r.mutable_model()->set_shadowing(static_cast<v1::Shadowing>(v)); });
+  unknown("model.masking", [](auto& r, int v) { r.mutable_model()->set_masking(static_cast<v1::Masking>(v)); });
+  unknown("model.shadowing", [](auto& r, int v) { r.mutable_model()->set_shadowing(static_cast<v1::Shadowing>(v)); });
   unknown("outputs", [](auto& r, int v) { r.add_outputs(static_cast<v1::Output>(v)); });
   expect_run_error("operation: missing", [](auto& r) { r.clear_operation(); });
-  expect_run_error("outputs: holds OUTPUT_UNSPECIFIED",
-                   [](auto& r) { r.add_outputs(v1::OUTPUT_UNSPECIFIED); });
-  expect_run_error("outputs: sample_reflection does not compute VALUE",
-                   [](auto& r) { r.add_outputs(v1::VALUE); });
+  expect_run_error("outputs: holds OUTPUT_UNSPECIFIED", [](auto& r) { r.add_outputs(v1::OUTPUT_UNSPECIFIED); });
+  expect_run_error("outputs: sample_reflection does not compute VALUE", [](auto& r) { r.add_outputs(v1::VALUE); });
   expect_run_error("outputs: sample_normal does not compute OUTGOING", [](auto& r) {
     r.set_operation(v1::SAMPLE_NORMAL);
     r.clear_u3();
@@ -189,8 +183,7 @@ TEST_F(MalformedCall, Generator) {
 
 TEST_F(MalformedCall, TooMuch) {
   const auto exhausted = StatusCode::RESOURCE_EXHAUSTED;
-  for (const std::uint64_t lanes :
-       {std::uint64_t{kMessageBytes / 4 + 1}, std::uint64_t{1} << 40, ~std::uint64_t{0}})
+  for (const std::uint64_t lanes : {std::uint64_t{kMessageBytes / 4 + 1}, std::uint64_t{1} << 40, ~std::uint64_t{0}})
     expect_run_error(
         "lanes: ", [&](auto& r) { r.set_lanes(lanes); }, exhausted);
   // A small request for a large answer.
@@ -267,8 +260,7 @@ TEST_F(MalformedCall, DamagedMessages) {
   int refused = 0, taken = 0;
   for (int round = 0; round < 3000; ++round) {
     std::string bytes = whole;
-    for (unsigned k = random() % 3 + 1; k > 0; --k)
-      bytes[random() % bytes.size()] = static_cast<char>(random());
+    for (unsigned k = random() % 3 + 1; k > 0; --k) bytes[random() % bytes.size()] = static_cast<char>(random());
     std::string response;
     const grpc::Status status = run_bytes("Run", bytes, &response);
     if (!status.ok()) {

@@ -28,8 +28,7 @@ TEST_F(RemoteCompact, IsTheSameForEveryShapeOfColumn) {
       for (const bool has_active : {false, true}) {
         for (const std::size_t width : {0, 1, 3, 150}) {
           if (width == 150 && lanes > 1009) continue;
-          SCOPED_TRACE(::testing::Message()
-                       << lanes << " lanes, active " << has_active << ", columns " << width);
+          SCOPED_TRACE(::testing::Message() << lanes << " lanes, active " << has_active << ", columns " << width);
           Memory<std::uint8_t> status(lanes, shape, 0);
           Memory<float> values(lanes, shape, 0);
           std::vector<std::uint32_t> active;
@@ -51,11 +50,8 @@ TEST_F(RemoteCompact, IsTheSameForEveryShapeOfColumn) {
             for (std::size_t k = 0; k < width; ++k) result.columns.emplace_back(room, shape, kUntouched);
             for (std::size_t k = 0; k < width; ++k)
               dense.push_back({k == 1 ? Column<float>(3.5f) : values.in(), result.columns[k].out()});
-            Compaction compaction{.lanes = lanes,
-                                  .active = {},
-                                  .status = status.in(),
-                                  .index = result.index.out(),
-                                  .columns = dense};
+            Compaction compaction{
+                .lanes = lanes, .active = {}, .status = status.in(), .index = result.index.out(), .columns = dense};
             if (has_active) compaction.active = active;
             const auto accepted = on.compact(compaction);
             EXPECT_TRUE(accepted.ok()) << accepted.status();

@@ -95,8 +95,7 @@ struct Case {
 
 class Remote : public ::testing::Test {
  protected:
-  std::unique_ptr<Engine> connect_to(const std::vector<std::string>& addresses, std::size_t piece_bytes,
-                                     int window) {
+  std::unique_ptr<Engine> connect_to(const std::vector<std::string>& addresses, std::size_t piece_bytes, int window) {
     ConnectOptions options;
     options.piece_bytes = piece_bytes;
     options.window = window;
@@ -121,8 +120,7 @@ class Remote : public ::testing::Test {
     for (std::size_t k = 0; k < c.lanes; ++k) ids[k] = lanes[k].id;
     std::vector<std::uint32_t> active;
     for (std::size_t k = 0; k < c.lanes; ++k)
-      if (const std::size_t lane = (k * 7 + 3) % c.lanes; c.lanes % 7 != 0 && lane % 3 != 1)
-        active.push_back(lane);
+      if (const std::size_t lane = (k * 7 + 3) % c.lanes; c.lanes % 7 != 0 && lane % 3 != 1) active.push_back(lane);
 
     for (const Operation operation : all_operations()) {
       if (operation > Operation::masking) continue;  // needs a dielectric: below
@@ -137,7 +135,8 @@ class Remote : public ::testing::Test {
         const bool generates = samples && c.random != Random::columns;
         for (const InputField& field : input_fields()) {
           const std::string name(field.name);
-          if (!(field.operations & bit(operation)) || !columns.contains(name) || (name[0] == 'u' && generates)) continue;
+          if (!(field.operations & bit(operation)) || !columns.contains(name) || (name[0] == 'u' && generates))
+            continue;
           field.column(batch) = columns.at(name).in();
         }
         if (c.broadcast) {
@@ -196,8 +195,8 @@ TEST_F(Remote, GivesTheSameBytesForEveryKindOfRandomNumbers) {
     for (const Random random : {Random::generator, Random::generator_ids, Random::generator_one_id})
       for (const bool active : {false, true})
         for (const bool some : {false, true}) {
-          SCOPED_TRACE(::testing::Message() << lanes << " lanes, random " << static_cast<int>(random)
-                                            << ", active " << active << ", some outputs " << some);
+          SCOPED_TRACE(::testing::Message() << lanes << " lanes, random " << static_cast<int>(random) << ", active "
+                                            << active << ", some outputs " << some);
           compare(*engine, {.lanes = lanes,
                             .shape = Shape::strided,
                             .broadcast = some,
@@ -248,9 +247,7 @@ TEST_F(Remote, OutputsMayBeTheInputs) {
   ASSERT_NE(engine, nullptr);
   std::vector<Lane> near = make_lanes(3001), far = near;
   const auto in_place = [](std::vector<Lane>& lanes) {
-    const auto in = [&](float Lane::*member) {
-      return Column<float>(&(lanes[0].*member), lanes.size(), sizeof(Lane));
-    };
+    const auto in = [&](float Lane::*member) { return Column<float>(&(lanes[0].*member), lanes.size(), sizeof(Lane)); };
     const auto out = [&](float Lane::*member) {
       return OutputColumn<float>(&(lanes[0].*member), lanes.size(), sizeof(Lane));
     };
@@ -309,11 +306,9 @@ TEST_F(Remote, ErrorsNameTheServer) {
   const std::string nobody = "unix:" + folder_.path("nobody");
   const auto refused = connect(std::vector{nobody}, options);
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_NE(std::string(refused.status().message()).find("server " + nobody), std::string::npos)
-      << refused.status();
+  EXPECT_NE(std::string(refused.status().message()).find("server " + nobody), std::string::npos) << refused.status();
   EXPECT_EQ(connect(std::vector<std::string>{}).status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(connect(std::vector<std::string>{"nonsense"}).status().code(),
-            absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(connect(std::vector<std::string>{"nonsense"}).status().code(), absl::StatusCode::kInvalidArgument);
 
   ServerProcess server({"--listen", "unix:" + folder_.path("s")});
   options.connect_timeout = std::chrono::milliseconds(2000);

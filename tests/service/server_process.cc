@@ -71,8 +71,7 @@ void ServerProcess::signal(int number) const {
 int ServerProcess::wait() {
   if (process_ <= 0) return -1;
   char buffer[4096];
-  for (ssize_t length; (length = read(errors_pipe_, buffer, sizeof buffer)) > 0;)
-    errors_.append(buffer, length);
+  for (ssize_t length; (length = read(errors_pipe_, buffer, sizeof buffer)) > 0;) errors_.append(buffer, length);
   int status = 0;
   waitpid(process_, &status, 0);
   process_ = -1;

@@ -10,8 +10,7 @@
 namespace {
 
 // Reports the request's filter as the operation, `total` times.
-absl::Status report_steps(const facetwise::v1::BenchmarkRequest& request,
-                          const facetwise::BenchmarkReport& report) {
+absl::Status report_steps(const facetwise::v1::BenchmarkRequest& request, const facetwise::BenchmarkReport& report) {
   if (request.filter() == "fail") return absl::InvalidArgumentError("filter: the runner says no");
   const unsigned total = request.filter() == "long" ? 1000 : 3;
   for (unsigned k = 1; k <= total; ++k) {

@@ -31,10 +31,10 @@ Vector any_direction(std::uint64_t seed, std::uint64_t lane, bool queried) {
   const float sign = queried && hash(seed + 2, lane) % 8 != 0 ? 1.0f : -1.0f;
   switch (hash(seed + 3, lane) % 10) {
     case 0: return {0, 0, 1};
-    case 1: return direction(seed, lane, u * 1e-3f);         // grazing
+    case 1: return direction(seed, lane, u * 1e-3f);  // grazing
     case 2: return direction(seed, lane, u * 1e-6f);
     case 3: return direction(seed, lane, sign * u * 1e-3f);
-    case 4: return direction(seed, lane, sign * u);          // behind, for incident directions
+    case 4: return direction(seed, lane, sign * u);  // behind, for incident directions
     case 5: return direction(seed, lane, -1 + u * 1e-4f);
     default: return direction(seed, lane, u);
   }
@@ -116,7 +116,8 @@ void add_plain(std::vector<Call>& calls) {
     const bool shadowed = operation == Operation::sample_reflection || operation == Operation::evaluate_reflection;
     if (operation == Operation::evaluate_reflection)
       for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated})
-        calls.push_back({.operation = operation, .sampler = Sampler::cap, .shadowing = shadowing, .values_alone = true});
+        calls.push_back(
+            {.operation = operation, .sampler = Sampler::cap, .shadowing = shadowing, .values_alone = true});
     for (const Sampler sampler : all_samplers()) {
       if (operation == Operation::masking && sampler != Sampler::cap) continue;
       if (sampler == Sampler::visible) continue;  // `cap`
@@ -195,8 +196,16 @@ Lanes ordinary_lanes(std::size_t count, std::uint64_t seed) {
     // Stretches of isotropic lanes, so that whole vectors of them and mixed ones occur.
     const bool isotropic = (lane / 64) % 2 == 0 || hash(100 * seed + 31, lane) % 3 == 0;
     const float alpha_y = isotropic ? alpha_x : any_alpha(100 * seed + 41, lane);
-    const float values[] = {i.x, i.y, i.z, alpha_x, alpha_y, o.x, o.y, o.z,
-                            any_u(100 * seed + 51, lane), any_u(100 * seed + 61, lane),
+    const float values[] = {i.x,
+                            i.y,
+                            i.z,
+                            alpha_x,
+                            alpha_y,
+                            o.x,
+                            o.y,
+                            o.z,
+                            any_u(100 * seed + 51, lane),
+                            any_u(100 * seed + 61, lane),
                             any_u(100 * seed + 71, lane)};
     for (std::size_t k = 0; k < std::size(values); ++k) lanes.in[input::kPlain[k]][lane] = values[k];
     const auto between = [&](std::uint64_t stream, float low, float high) {
@@ -218,8 +227,8 @@ Lanes ordinary_lanes(std::size_t count, std::uint64_t seed) {
 Lanes adversarial_lanes(std::size_t count, std::uint64_t seed) {
   Lanes lanes = ordinary_lanes(count, seed);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
-  constexpr float kBad[] = {kNan, -kNan, kInf, -kInf, -0.0f, 0.0f, 1e-40f, -1e-40f, 5e-5f, 9.99e-5f, 10.001f,
-                            1.0f, 1.0005f, -1.0f, 0x1p100f, 2.0f, -0.1f};
+  constexpr float kBad[] = {kNan,     -kNan,   kInf, -kInf,   -0.0f, 0.0f,     1e-40f, -1e-40f, 5e-5f,
+                            9.99e-5f, 10.001f, 1.0f, 1.0005f, -1.0f, 0x1p100f, 2.0f,   -0.1f};
   for (std::size_t lane = 0; lane < count; ++lane) {
     const std::uint64_t bits = hash(seed + 1000, lane);
     if ((lane / 128) % 2 == 0 || bits % 6 != 0) continue;
@@ -237,7 +246,8 @@ Lanes adversarial_lanes(std::size_t count, std::uint64_t seed) {
 }
 
 bool same_bits(const Answer& a, const Answer& b) {
-  if (a.statistics != b.statistics || a.status != b.status || a.event != b.event || a.out.size() != b.out.size()) return false;
+  if (a.statistics != b.statistics || a.status != b.status || a.event != b.event || a.out.size() != b.out.size())
+    return false;
   for (std::size_t k = 0; k < a.out.size(); ++k) {
     if (a.out[k].size() != b.out[k].size()) return false;
     if (!a.out[k].empty() && std::memcmp(a.out[k].data(), b.out[k].data(), 4 * a.out[k].size()) != 0) return false;

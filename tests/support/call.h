@@ -21,8 +21,8 @@ struct Call {
   Operation operation;
   Sampler sampler;
   Shadowing shadowing;
-  Model model{};         // but for its shadowing
-  bool moments = false;  // mean slopes and correlated roughness too
+  Model model{};              // but for its shadowing
+  bool moments = false;       // mean slopes and correlated roughness too
   bool values_alone = false;  // evaluate_reflection without its pdf, for which the sampler is not read
 };
 std::string call_name(const Call& call);
@@ -42,8 +42,24 @@ bool writes(const Call& call, const ByteField& field);
 // Places of columns in Lanes::in: the order of input_fields().
 namespace input {
 enum Index : std::size_t {
-  incident_x, incident_y, incident_z, alpha_x, alpha_y, mean_slope_x, mean_slope_y, slope_correlation, eta, f0, f90,
-  outgoing_x, outgoing_y, outgoing_z, u1, u2, u3, count
+  incident_x,
+  incident_y,
+  incident_z,
+  alpha_x,
+  alpha_y,
+  mean_slope_x,
+  mean_slope_y,
+  slope_correlation,
+  eta,
+  f0,
+  f90,
+  outgoing_x,
+  outgoing_y,
+  outgoing_z,
+  u1,
+  u2,
+  u3,
+  count
 };
 // Those that every model has.
 inline constexpr Index kPlain[] = {incident_x, incident_y, incident_z, alpha_x, alpha_y, outgoing_x,
@@ -56,7 +72,8 @@ struct Lanes {
   std::vector<std::vector<float>> in;
 };
 // Lanes of every kind, mixed: in front, grazing, behind, straight below; alpha from 1e-4 to 10 (for Phong too,
-// where those above 1 are invalid), isotropic and not; u at 0 and at the largest float below 1; smooth lanes, and lanes that are invalid in every way.
+// where those above 1 are invalid), isotropic and not; u at 0 and at the largest float below 1; smooth lanes, and lanes
+// that are invalid in every way.
 Lanes adversarial_lanes(std::size_t count, std::uint64_t seed);
 // The same without smooth and invalid lanes.
 Lanes ordinary_lanes(std::size_t count, std::uint64_t seed);

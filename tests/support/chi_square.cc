@@ -40,8 +40,7 @@ double upper_incomplete_gamma(double a, double x) {
   return h * factor(a, x);
 }
 
-ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> expected,
-                     double smallest) {
+ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> expected, double smallest) {
   std::vector<std::size_t> order(counts.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return expected[a] < expected[b]; });

@@ -17,8 +17,7 @@ std::vector<Configuration> make() {
   for (double theta : {90.5, 100.0, 135.0, 170.0})
     for (double alpha : {0.01, 0.3, 1.0, 4.0}) all.push_back({theta, 20, alpha, alpha});
   // Anisotropic, to 20:1, rotated.
-  const double roughness[][2] = {{1e-3, 0.02}, {0.02, 0.4}, {0.05, 1}, {1, 0.05},
-                                 {0.8, 0.1},   {4, 0.2},    {1.5, 4}};
+  const double roughness[][2] = {{1e-3, 0.02}, {0.02, 0.4}, {0.05, 1}, {1, 0.05}, {0.8, 0.1}, {4, 0.2}, {1.5, 4}};
   const double directions[][2] = {{45, 37}, {75, 90}, {89.9, 215}, {90.5, 300}};
   for (const auto& r : roughness)
     for (const auto& d : directions) all.push_back({d[0], d[1], r[0], r[1]});

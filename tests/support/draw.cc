@@ -21,8 +21,7 @@ Statistics draw(const Draw& what, const std::function<void(const Drawn&)>& each)
     batch.model = what.model;
     batch.sampler = what.sampler;
     batch.lanes = lanes;
-    batch.incident = {static_cast<float>(what.i.x), static_cast<float>(what.i.y),
-                      static_cast<float>(what.i.z)};
+    batch.incident = {static_cast<float>(what.i.x), static_cast<float>(what.i.y), static_cast<float>(what.i.z)};
     batch.alpha_x = static_cast<float>(what.alpha.x);
     batch.alpha_y = static_cast<float>(what.alpha.y);
     batch.generator = Generator{.seed = what.seed, .dimension = 0, .id = {}, .first_id = first};

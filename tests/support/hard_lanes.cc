@@ -14,9 +14,7 @@ class Sequence {
  public:
   Sequence(std::uint64_t seed, std::uint64_t stream) : seed_(hash(seed, stream)) {}
   std::uint32_t bits() { return static_cast<std::uint32_t>(hash(seed_, index_++) >> 32); }
-  std::uint32_t below(std::uint32_t n) {
-    return static_cast<std::uint32_t>((std::uint64_t{bits()} * n) >> 32);
-  }
+  std::uint32_t below(std::uint32_t n) { return static_cast<std::uint32_t>((std::uint64_t{bits()} * n) >> 32); }
   float uniform() { return static_cast<float>(bits() >> 8) * 0x1p-24f; }
   bool one_in(std::uint32_t n) { return below(n) == 0; }
 
@@ -31,19 +29,14 @@ constexpr float kBelowOne = 1.0f - 0x1p-24f;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-float power_of_two(int exponent) {
-  return std::bit_cast<float>(static_cast<std::uint32_t>(exponent + 127) << 23);
-}
+float power_of_two(int exponent) { return std::bit_cast<float>(static_cast<std::uint32_t>(exponent + 127) << 23); }
 
 // What is alike in a block of lanes.
 struct Block {
   bool front, isotropic, gentle;  // alpha <= 1
   bool exceptions;
   explicit Block(Sequence next)
-      : front(next.one_in(3)),
-        isotropic(next.one_in(4)),
-        gentle(next.one_in(2)),
-        exceptions(next.one_in(2)) {}
+      : front(next.one_in(3)), isotropic(next.one_in(4)), gentle(next.one_in(2)), exceptions(next.one_in(2)) {}
 };
 
 struct Direction3 {
@@ -71,17 +64,10 @@ Direction3 with_z(Sequence& next, float z) {
 Direction3 direction(Sequence& next, bool front) {
   float z = next.uniform();
   switch (next.below(8)) {
-    case 0:
-      z = (1 + z) / 2 * power_of_two(-static_cast<int>(next.below(60)));
-      break;  // grazing
-    case 1:
-      z = 1 - z * z * power_of_two(-static_cast<int>(next.below(20)));
-      break;  // steep
-    case 2:
-      z = next.one_in(4) ? 0x1p-140f : next.one_in(2) ? 1.0f : 0.0f;
-      break;
-    default:
-      break;
+    case 0: z = (1 + z) / 2 * power_of_two(-static_cast<int>(next.below(60))); break;  // grazing
+    case 1: z = 1 - z * z * power_of_two(-static_cast<int>(next.below(20))); break;    // steep
+    case 2: z = next.one_in(4) ? 0x1p-140f : next.one_in(2) ? 1.0f : 0.0f; break;
+    default: break;
   }
   if (front) z = std::max(z, 0x1p-149f);
   if (!front && next.one_in(2)) z = -z;
@@ -105,48 +91,29 @@ float alpha(Sequence& next, bool gentle) {
 float any_u(Sequence& next) {
   if (!next.one_in(10)) return next.uniform();
   switch (next.below(8)) {
-    case 0:
-      return 0.0f;
-    case 1:
-      return -0.0f;
-    case 2:
-      return kBelowOne;
-    case 3:
-      return 0.25f * static_cast<float>(next.below(4));
-    case 4:
-      return 0x1p-149f;
-    case 5:
-      return 0x1p-24f;
-    case 6:
-      return power_of_two(-static_cast<int>(next.below(126)) - 1);
-    default:
-      return 1 - 0x1p-23f;
+    case 0: return 0.0f;
+    case 1: return -0.0f;
+    case 2: return kBelowOne;
+    case 3: return 0.25f * static_cast<float>(next.below(4));
+    case 4: return 0x1p-149f;
+    case 5: return 0x1p-24f;
+    case 6: return power_of_two(-static_cast<int>(next.below(126)) - 1);
+    default: return 1 - 0x1p-23f;
   }
 }
 
 // Makes an ordinary lane smooth or invalid.
 void spoil(Sequence& next, float (&lane)[kFields]) {
-  static constexpr float kBad[] = {kNan,  -kNan,      kInfinity, -kInfinity, 3e38f,
-                                   -1.0f, -0x1p-149f, 11.0f,     1.001f};
+  static constexpr float kBad[] = {kNan, -kNan, kInfinity, -kInfinity, 3e38f, -1.0f, -0x1p-149f, 11.0f, 1.001f};
   static constexpr float kBadAlpha[] = {0.0f, -0.0f, -0.5f, 10.00001f, 0x1p-149f, 9.9999e-5f, 1e-30f};
   static constexpr float kBadU[] = {1.0f, -0x1p-149f, -0x1p-24f, 1.5f, 1e30f};
   float& field = lane[next.below(kFields)];
   switch (next.below(6)) {
-    case 0:
-      field = kBad[next.below(std::size(kBad))];
-      break;
-    case 1:
-      field = std::bit_cast<float>(next.bits());
-      break;
-    case 2:
-      lane[kAlphaX + next.below(2)] = kBadAlpha[next.below(std::size(kBadAlpha))];
-      break;
-    case 3:
-      lane[kAlphaX + next.below(2)] = kSmallestAlpha * next.uniform();
-      break;
-    case 4:
-      lane[kU1 + next.below(3)] = kBadU[next.below(std::size(kBadU))];
-      break;
+    case 0: field = kBad[next.below(std::size(kBad))]; break;
+    case 1: field = std::bit_cast<float>(next.bits()); break;
+    case 2: lane[kAlphaX + next.below(2)] = kBadAlpha[next.below(std::size(kBadAlpha))]; break;
+    case 3: lane[kAlphaX + next.below(2)] = kSmallestAlpha * next.uniform(); break;
+    case 4: lane[kU1 + next.below(3)] = kBadU[next.below(std::size(kBadU))]; break;
     default: {  // length just, or well, outside
       float scale = next.one_in(2) ? 1.0006f : 0.9994f;
       if (next.one_in(4)) scale /= 2;

@@ -85,8 +85,7 @@ Verdict test_hypotheses(const Draw& what, const std::vector<Hypothesis>& hypothe
       verdict.outside = std::max({verdict.outside, -sample.o.z, -sample.o.z - what.i.z});
       if (from_o) m = unit({what.i.x + sample.o.x, what.i.y + sample.o.y, what.i.z + sample.o.z});
     }
-    for (std::size_t n = 0; n < all.size(); ++n)
-      ++all[n].counts[all[n].grid.cell(hypotheses[n].lobe.alpha, m)];
+    for (std::size_t n = 0; n < all.size(); ++n) ++all[n].counts[all[n].grid.cell(hypotheses[n].lobe.alpha, m)];
   });
   for (const Cells& cells : all) verdict.tests.push_back(chi_square(cells.counts, cells.expected));
   verdict.share_expected = 1 - all[0].expected.back() / static_cast<double>(what.count);

@@ -44,17 +44,14 @@ double end_of_unit_interval(Maker& make) {
 Vector outgoing(Maker& make, const Lane& lane, std::size_t n) {
   const Vector i = {lane[kIx], lane[kIy], lane[kIz]};
   switch (n / 8 % 4) {
-    case 0:
-      return make.direction(make.uniform());
+    case 0: return make.direction(make.uniform());
     case 1: {
-      const auto sample = reference::sample_reflection({}, Sampler::cap, {lane[kAlphaX], lane[kAlphaY]}, i,
-                                                       lane[kU1], lane[kU2], lane[kU3]);
+      const auto sample = reference::sample_reflection({}, Sampler::cap, {lane[kAlphaX], lane[kAlphaY]}, i, lane[kU1],
+                                                       lane[kU2], lane[kU3]);
       return sample.o;
     }
-    case 2:
-      return i.z > 0 ? Vector{-i.x, -i.y, i.z} : Vector{i.x, i.y, -i.z};
-    default:
-      return make.direction(make.logarithmic(1e-8, 1));
+    case 2: return i.z > 0 ? Vector{-i.x, -i.y, i.z} : Vector{i.x, i.y, -i.z};
+    default: return make.direction(make.logarithmic(1e-8, 1));
   }
 }
 
@@ -77,9 +74,7 @@ LaneColumns make_lanes(std::size_t count, std::uint64_t seed) {
     lane[kAlphaY] = make.chance(2) ? lane[kAlphaX] : make.logarithmic(1.001e-4, 9.99);
     for (int k : {kU1, kU2, kU3}) lane[k] = make.u();
     switch (n % 8) {
-      case 4:
-        i = make.direction((make.chance(2) ? 1 : -1) * make.logarithmic(1e-8, 1));
-        break;
+      case 4: i = make.direction((make.chance(2) ? 1 : -1) * make.logarithmic(1e-8, 1)); break;
       case 5:
         for (int k : {kU1, kU2, kU3})
           if (!make.chance(3)) lane[k] = end_of_unit_interval(make);
@@ -99,8 +94,7 @@ LaneColumns make_lanes(std::size_t count, std::uint64_t seed) {
         if (tilt > 1e-3 && make.chance(2)) i.z = -i.z;
         break;
       }
-      default:
-        break;
+      default: break;
     }
     lane[kIx] = static_cast<float>(i.x);
     lane[kIy] = static_cast<float>(i.y);

@@ -90,19 +90,18 @@ double along(const Lobe& lobe, const Integrand& integrand, double low, double hi
   return sum * (high - low) / 2;
 }
 
-double along_adaptive(const Lobe& lobe, const Integrand& integrand, double low, double high, double phi,
-                      double whole, double tolerance, int depth) {
+double along_adaptive(const Lobe& lobe, const Integrand& integrand, double low, double high, double phi, double whole,
+                      double tolerance, int depth) {
   const double middle = (low + high) / 2;
-  const double left = along(lobe, integrand, low, middle, phi),
-               right = along(lobe, integrand, middle, high, phi);
+  const double left = along(lobe, integrand, low, middle, phi), right = along(lobe, integrand, middle, high, phi);
   if (std::abs(whole - left - right) <= tolerance || depth == 0) return left + right;
   return along_adaptive(lobe, integrand, low, middle, phi, left, tolerance, depth - 1) +
          along_adaptive(lobe, integrand, middle, high, phi, right, tolerance, depth - 1);
 }
 
 // Integrals over phi in [a, b] of all t cells, by the outer rule. tolerance_t > 0: adaptive in t, too.
-void strip(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b,
-           double tolerance_t, std::vector<double>& sums) {
+void strip(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b, double tolerance_t,
+           std::vector<double>& sums) {
   std::fill(sums.begin(), sums.end(), 0.0);
   const auto& outer = outer_rule();
   for (std::size_t k = 0; k < outer.x.size(); ++k) {
@@ -136,8 +135,8 @@ void refine(const Lobe& lobe, const Grid& grid, const Integrand& integrand, doub
 }
 
 // Edges that cut a histogram over [low, high] into equal parts.
-std::vector<double> quantiles(const std::vector<double>& histogram, double low, double high, int cells,
-                              double first, double last) {
+std::vector<double> quantiles(const std::vector<double>& histogram, double low, double high, int cells, double first,
+                              double last) {
   double total = 0;
   for (double h : histogram) total += h;
   std::vector<double> edges = {first};
@@ -190,14 +189,13 @@ Grid make_grid(const Lobe& lobe, const Integrand& integrand, int t_cells, int ph
       of_phi[p] += value;
     }
   }
-  return {quantiles(of_t, low, high, t_cells, 0, kHalfPi),
-          quantiles(of_phi, 0, kTwoPi, phi_cells, 0, kTwoPi)};
+  return {quantiles(of_t, low, high, t_cells, 0, kHalfPi), quantiles(of_phi, 0, kTwoPi, phi_cells, 0, kTwoPi)};
 }
 
 namespace {
 
-std::vector<double> integrate_grid(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
-                                   double tolerance, double tolerance_t) {
+std::vector<double> integrate_grid(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double tolerance,
+                                   double tolerance_t) {
   std::vector<double> cells(grid.cells());
   std::vector<double> whole(grid.t.size() - 1);
   for (std::size_t p = 0; p + 1 < grid.phi.size(); ++p) {
@@ -210,8 +208,7 @@ std::vector<double> integrate_grid(const Lobe& lobe, const Grid& grid, const Int
 
 }  // namespace
 
-std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
-                                    double tolerance) {
+std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double tolerance) {
   return integrate_grid(lobe, grid, integrand, tolerance, 0);
 }
 

@@ -32,9 +32,7 @@ struct Grid {
   std::size_t cells() const { return (t.size() - 1) * (phi.size() - 1); }
   // The cell of a normal, and a cell's index.
   std::size_t cell(reference::Roughness alpha, reference::Vector m) const;
-  std::size_t index(std::size_t phi_cell, std::size_t t_cell) const {
-    return phi_cell * (t.size() - 1) + t_cell;
-  }
+  std::size_t index(std::size_t phi_cell, std::size_t t_cell) const { return phi_cell * (t.size() - 1) + t_cell; }
 };
 
 // A grid whose rows, and whose columns, hold equal parts of the integral, roughly.
@@ -42,8 +40,7 @@ Grid make_grid(const Lobe& lobe, const Integrand& integrand, int t_cells, int ph
 
 // The integral over each cell; the error of each is about `tolerance`. For densities of samplers, which are
 // smooth along t inside the lobe.
-std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand,
-                                    double tolerance);
+std::vector<double> integrate_cells(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double tolerance);
 
 // The integral over the whole lobe of anything.
 double integrate(const Lobe& lobe, const Integrand& integrand, double tolerance = 1e-10);

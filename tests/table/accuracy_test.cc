@@ -14,8 +14,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr double kIncidence[][2] = {{0, 0},      {0.4, 0.7}, {0.9, 2.1}, {1.3, 3.6},
-                                    {1.55, 5.1}, {1.9, 0.2}, {2.6, 1.5}};
+constexpr double kIncidence[][2] = {{0, 0}, {0.4, 0.7}, {0.9, 2.1}, {1.3, 3.6}, {1.55, 5.1}, {1.9, 0.2}, {2.6, 1.5}};
 
 // Less than that a test of 2 10^5 samples pools.
 constexpr double kSmallestCell = 5e-5;
@@ -32,24 +31,21 @@ Accuracy measure(const SlopeTable& table, const SlopeDensity& p22) {
     const Cells cells(theta, phi);
     auto exact = cells.visible(p22, 16);
     const double area = std::accumulate(exact.begin(), exact.end(), 0.0);
-    const auto drawn =
-        cells.integrals([&](double x, double y) { return table.drawn_density(theta, phi, x, y); }, 16);
+    const auto drawn = cells.integrals([&](double x, double y) { return table.drawn_density(theta, phi, x, y); }, 16);
     double distance = 0;
     for (std::size_t k = 0; k < exact.size(); ++k)
-      if (exact[k] > kSmallestCell * area)
-        distance += std::pow(drawn[k] - exact[k] / area, 2) / (exact[k] / area);
+      if (exact[k] > kSmallestCell * area) distance += std::pow(drawn[k] - exact[k] / area, 2) / (exact[k] / area);
     const double c = std::cos(theta), s = std::sin(theta);
     const auto squares = cells.integrals(
         [&](double x, double y) {
-          const double seen =
-              std::max(c - s * (std::cos(phi) * x + std::sin(phi) * y), 0.0) * p22(x, y) / area;
+          const double seen = std::max(c - s * (std::cos(phi) * x + std::sin(phi) * y), 0.0) * p22(x, y) / area;
           return seen * seen / table.drawn_density(theta, phi, x, y);
         },
         16);
     accuracy.distance = std::max(accuracy.distance, distance);
     accuracy.variance = std::max(accuracy.variance, std::accumulate(squares.begin(), squares.end(), 0.0) - 1);
-    accuracy.area = std::max(
-        accuracy.area, std::abs(table.tabulated_area(theta, phi) / table.projected_area(theta, phi) - 1));
+    accuracy.area =
+        std::max(accuracy.area, std::abs(table.tabulated_area(theta, phi) / table.projected_area(theta, phi) - 1));
   }
   return accuracy;
 }
@@ -60,9 +56,9 @@ void report(const char* name, const SlopeDensity& p22, const SlopeTable::Options
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const Accuracy accuracy = measure(*table, p22);
   const SlopeTableView& v = table->view();
-  std::printf("| %s | %d x %d x %d x %d | %.2f MB | %.2f s | %.1e | %.1e | %.1e |\n", name, v.azimuths,
-              v.incidence, v.slopes, v.uniforms, static_cast<double>(table->bytes()) / 1e6, seconds,
-              accuracy.distance, accuracy.variance, accuracy.area);
+  std::printf("| %s | %d x %d x %d x %d | %.2f MB | %.2f s | %.1e | %.1e | %.1e |\n", name, v.azimuths, v.incidence,
+              v.slopes, v.uniforms, static_cast<double>(table->bytes()) / 1e6, seconds, accuracy.distance,
+              accuracy.variance, accuracy.area);
 }
 
 TEST(Accuracy, Printed) {

@@ -16,8 +16,7 @@ using std::numbers::pi;
 TEST(SlopeTable, GgxIsExact) {
   const SlopeTable& table = ggx_table();
   for (const double x : {0.0, 0.3, -2.0, 50.0, 3000.0})
-    for (const double y : {0.0, -0.7, 9.0})
-      EXPECT_NEAR(table.p22(x, y) / ggx(x, y), 1, 1e-6) << x << " " << y;
+    for (const double y : {0.0, -0.7, 9.0}) EXPECT_NEAR(table.p22(x, y) / ggx(x, y), 1, 1e-6) << x << " " << y;
   for (double theta = 0; theta < 3.14; theta += 0.1) {
     const double area = (1 + std::cos(theta)) / 2;
     EXPECT_NEAR(table.projected_area(theta, 0.3) / area, 1, 5e-6) << theta;
@@ -27,8 +26,7 @@ TEST(SlopeTable, GgxIsExact) {
 
 TEST(SlopeTable, BeckmannsArea) {
   const SlopeTable& table = beckmann_table();
-  for (const double x : {0.0, 0.3, -1.0, 2.0})
-    EXPECT_NEAR(table.p22(x, 0.1) / beckmann(x, 0.1), 1, 1e-4) << x;
+  for (const double x : {0.0, 0.3, -1.0, 2.0}) EXPECT_NEAR(table.p22(x, 0.1) / beckmann(x, 0.1), 1, 1e-4) << x;
   for (double theta = 0.05; theta < 2.4; theta += 0.1) {
     // Walter et al. 2007, before their rational fit.
     const double a = 1 / std::tan(theta);
@@ -44,8 +42,7 @@ TEST(SlopeTable, SkewedArea) {
   EXPECT_NEAR(table.projected_area(0, 0), 1, 1e-5);
   for (const double theta : {0.0, 0.5, 1.0, 1.4, 1.6, 2.0})
     for (const double phi : {0.1, 1.7, 3.0, 4.4})
-      EXPECT_NEAR(table.tabulated_area(theta, phi) / table.projected_area(theta, phi), 1,
-                  kQuick ? 1e-3 : 2e-4)
+      EXPECT_NEAR(table.tabulated_area(theta, phi) / table.projected_area(theta, phi), 1, kQuick ? 1e-3 : 2e-4)
           << theta << " " << phi;
 }
 
@@ -89,20 +86,14 @@ TEST(SlopeTable, RefusesWhatIsNoDensity) {
   const double infinity = std::numeric_limits<double>::infinity(), nan = std::nan("");
   EXPECT_EQ(refusal(nullptr), "p22: empty");
   EXPECT_EQ(refusal([](double, double) { return 0.0; }), "p22: 0 at every slope of the grid");
-  EXPECT_EQ(refusal([&](double x, double) { return x > 0 ? 1.0 : nan; }),
-            "p22: not finite at slope (0, 0): nan");
-  EXPECT_EQ(refusal([&](double x, double) { return x > 0 ? 1.0 : infinity; }),
-            "p22: not finite at slope (0, 0): inf");
-  EXPECT_EQ(refusal([](double x, double) { return x > 0 ? 1.0 : -2.0; }),
-            "p22: negative at slope (0, 0): -2");
-  EXPECT_EQ(
-      refusal([](double, double) { return 1e300; }).find("p22: its projected area is not finite: 1e+300 at"),
-      0u);
+  EXPECT_EQ(refusal([&](double x, double) { return x > 0 ? 1.0 : nan; }), "p22: not finite at slope (0, 0): nan");
+  EXPECT_EQ(refusal([&](double x, double) { return x > 0 ? 1.0 : infinity; }), "p22: not finite at slope (0, 0): inf");
+  EXPECT_EQ(refusal([](double x, double) { return x > 0 ? 1.0 : -2.0; }), "p22: negative at slope (0, 0): -2");
+  EXPECT_EQ(refusal([](double, double) { return 1e300; }).find("p22: its projected area is not finite: 1e+300 at"), 0u);
   // Not even at one node of many.
   int calls = 0;
-  EXPECT_NE(
-      refusal([&](double x, double y) { return ++calls == 40'000 ? nan : ggx(x, y); }, {}).find("not finite"),
-      std::string::npos);
+  EXPECT_NE(refusal([&](double x, double y) { return ++calls == 40'000 ? nan : ggx(x, y); }, {}).find("not finite"),
+            std::string::npos);
 }
 
 TEST(SlopeTable, RefusesWhatIsNotRadial) {

@@ -22,20 +22,17 @@ int Cells::of(double x, double y) const {
   return step(f) * n_ + step((h + 1) / 2);
 }
 
-std::vector<double> Cells::integrals(const std::function<double(double x, double y)>& density,
-                                     int fine) const {
+std::vector<double> Cells::integrals(const std::function<double(double x, double y)>& density, int fine) const {
   std::vector<double> sums(static_cast<std::size_t>(count()));
   const int all = n_ * fine;
   for (int row = 0; row < all; ++row) {
-    const double s = (row + 0.5) / all * reach_ - 1, cos_chi = (1 - s * s) / (1 + s * s),
-                 sin_chi = 2 * s / (1 + s * s);
+    const double s = (row + 0.5) / all * reach_ - 1, cos_chi = (1 - s * s) / (1 + s * s), sin_chi = 2 * s / (1 + s * s);
     for (int column = 0; column < all; ++column) {
       const double h = (column + 0.5) / all * 2 - 1, c = std::sqrt(1 - h * h), m_z = cos_chi * c;
       const double along = sin_chi * c / m_z, across = h / m_z;
       // dx dy = d(chi) dh / m_z^3
       sums[static_cast<std::size_t>(row / fine * n_ + column / fine)] +=
-          density(cos_ * along - sin_ * across, sin_ * along + cos_ * across) / (m_z * m_z * m_z) * 2 /
-          (1 + s * s);
+          density(cos_ * along - sin_ * across, sin_ * along + cos_ * across) / (m_z * m_z * m_z) * 2 / (1 + s * s);
     }
   }
   for (double& sum : sums) sum *= reach_ / all * 2 / all;

@@ -38,14 +38,12 @@ const SlopeTable& beckmann_table() {
 }
 const SlopeTable& skewed_table() {
   // An emulator would take a minute for the default.
-  static const SlopeTable::Options small{
-      .grid = 257, .incidence = 33, .slopes = 65, .uniforms = 64, .azimuths = 64};
+  static const SlopeTable::Options small{.grid = 257, .incidence = 33, .slopes = 65, .uniforms = 64, .azimuths = 64};
   static const auto table = build(skewed, kQuick ? small : SlopeTable::Options{});
   return *table;
 }
 const SlopeTable& coarse_table() {
-  static const auto table =
-      build(skewed, {.grid = 65, .incidence = 9, .slopes = 9, .uniforms = 32, .azimuths = 4});
+  static const auto table = build(skewed, {.grid = 65, .incidence = 9, .slopes = 9, .uniforms = 32, .azimuths = 4});
   return *table;
 }
 

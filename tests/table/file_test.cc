@@ -18,8 +18,8 @@ std::shared_ptr<const SlopeTable> small_table() {
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& name)
-      : path_(testing::TempDir() + "facetwise_" +
-              testing::UnitTest::GetInstance()->current_test_info()->name() + "_" + name) {}
+      : path_(testing::TempDir() + "facetwise_" + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
+              name) {}
   ~TemporaryFile() { std::filesystem::remove(path_); }
   const std::string& path() const { return path_; }
   void write(std::string_view bytes) const {
@@ -30,9 +30,7 @@ class TemporaryFile {
   std::string path_;
 };
 
-std::string refusal(std::string_view bytes) {
-  return std::string(SlopeTable::parse(bytes).status().message());
-}
+std::string refusal(std::string_view bytes) { return std::string(SlopeTable::parse(bytes).status().message()); }
 
 TEST(SlopeTableFile, SameBits) {
   const TemporaryFile file("table");

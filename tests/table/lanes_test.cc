@@ -29,8 +29,7 @@ void AllFunctions(const SlopeTableView& view, std::size_t n, const test::Columns
   const D d{};
   for (std::size_t k = 0; k < n; k += Lanes(d)) {
     const auto load = [&](const float* from) HWY_ATTR { return LoadU(d, from + k); };
-    const Vec<D> ct = load(to.cos_theta), st = load(to.sin_theta), cp = load(to.cos_phi),
-                 sp = load(to.sin_phi);
+    const Vec<D> ct = load(to.cos_theta), st = load(to.sin_theta), cp = load(to.cos_phi), sp = load(to.sin_phi);
     const Vec<D> u1 = load(to.u1), u2 = load(to.u2);
     Vec<D> x, y, density, mx, my, mz, normal_density;
     DrawVisibleSlope(d, view, ct, st, cp, sp, u1, u2, x, y, density);
@@ -51,8 +50,7 @@ void AllFunctions(const SlopeTableView& view, std::size_t n, const test::Columns
 
 using Function = void (*)(const SlopeTableView&, std::size_t, const test::Columns&);
 extern const Function kAllFunctions[3];
-const Function kAllFunctions[3] = {AllFunctions<hn::ScalableTag<float>>,
-                                   AllFunctions<Twice<hn::ScalableTag<float>>>,
+const Function kAllFunctions[3] = {AllFunctions<hn::ScalableTag<float>>, AllFunctions<Twice<hn::ScalableTag<float>>>,
                                    AllFunctions<hn::CappedTag<float, 1>>};
 
 }  // namespace HWY_NAMESPACE
@@ -127,9 +125,9 @@ struct Lanes {
   std::size_t size() const { return theta.size(); }
   void run(const Version& version, const SlopeTable& table) {
     version.run(table.view(), size(),
-                {in[0].data(), in[1].data(), in[2].data(), in[3].data(), in[4].data(), in[5].data(),
-                 out[0].data(), out[1].data(), out[2].data(), out[3].data(), out[4].data(), out[5].data(),
-                 out[6].data(), out[7].data(), out[8].data(), out[9].data(), out[10].data()});
+                {in[0].data(), in[1].data(), in[2].data(), in[3].data(), in[4].data(), in[5].data(), out[0].data(),
+                 out[1].data(), out[2].data(), out[3].data(), out[4].data(), out[5].data(), out[6].data(),
+                 out[7].data(), out[8].data(), out[9].data(), out[10].data()});
   }
 };
 
@@ -183,23 +181,21 @@ TEST(TableLanes, NearDouble) {
     EXPECT_LE(queried, few);
     EXPECT_LE(normals, few);
     EXPECT_LE(p22s, few);
-    std::printf("of %zu: slopes %d, densities %d, queried %d and %d, p22 %d apart; area %.2g\n", lanes.size(),
-                slopes, densities, queried, normals, p22s, area);
+    std::printf("of %zu: slopes %d, densities %d, queried %d and %d, p22 %d apart; area %.2g\n", lanes.size(), slopes,
+                densities, queried, normals, p22s, area);
     EXPECT_LE(area, 1e-4);
   }
 }
 
 // Lanes that mean nothing read inside the tables; a sanitizer would tell.
 TEST(TableLanes, Garbage) {
-  const float hard[] = {0,     -0.0f,  1,      -1, std::nanf(""), INFINITY, -INFINITY,
-                        1e38f, -1e38f, 1e-45f, 2,  0x1.fffffep-1f};
+  const float hard[] = {0, -0.0f, 1, -1, std::nanf(""), INFINITY, -INFINITY, 1e38f, -1e38f, 1e-45f, 2, 0x1.fffffep-1f};
   for (const Version& version : all_versions())
     for (const SlopeTable* table : tables()) {
       Lanes lanes(kQuick ? 512 : 4096);
       for (std::size_t k = 0; k < lanes.size(); ++k)
         for (int column = 0; column < kInputs; ++column)
-          if (const auto pick =
-                  philox4x32_10({static_cast<std::uint32_t>(k), 0, 0, 0}, {1, 0})[0] >> (4 * column) & 15;
+          if (const auto pick = philox4x32_10({static_cast<std::uint32_t>(k), 0, 0, 0}, {1, 0})[0] >> (4 * column) & 15;
               pick < std::size(hard))
             lanes.in[column][k] = hard[pick];
       lanes.run(version, *table);

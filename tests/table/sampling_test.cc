@@ -44,8 +44,8 @@ Tested test(const SlopeTable& table, const SlopeDensity& p22) {
   for (const auto& [theta, phi] : kIncidence) {
     SCOPED_TRACE(testing::Message() << "theta " << theta << ", phi " << phi);
     const Cells cells(theta, phi);
-    const auto own = cells.integrals(
-        [&](double x, double y) { return table.drawn_density(theta, phi, x, y); }, kQuick ? 32 : 48);
+    const auto own =
+        cells.integrals([&](double x, double y) { return table.drawn_density(theta, phi, x, y); }, kQuick ? 32 : 48);
     // Midpoints: the density has jumps.
     EXPECT_NEAR(std::accumulate(own.begin(), own.end(), 0.0), 1, 3e-3);
     const auto drawn = counts(table, theta, phi, cells);
@@ -75,8 +75,7 @@ TEST(Sampling, DefaultSkewed) {
 TEST(Sampling, SmallTablesFollowTheirOwnDensityAlone) {
   const SlopeTable::Options radial{.radial = true, .incidence = 16, .slopes = 16, .uniforms = 16};
   const SlopeTable::Options full{.incidence = 16, .slopes = 16, .uniforms = 16, .azimuths = 16};
-  for (const auto& [name, p22, options] :
-       {std::tuple{"beckmann", &beckmann, radial}, {"skewed", &skewed, full}}) {
+  for (const auto& [name, p22, options] : {std::tuple{"beckmann", &beckmann, radial}, {"skewed", &skewed, full}}) {
     SCOPED_TRACE(name);
     const Tested tested = test(*build(p22, options), p22);
     EXPECT_GT(tested.own, kPasses);
@@ -92,10 +91,9 @@ TEST(Sampling, DensityIntegratesToOne) {
     for (const double theta : kThetas)
       for (const double phi : {0.0, 0.8, 3.1416, 4.0}) {
         if (table->radial() && phi != 0) continue;
-        const auto shares =
-            Cells(theta, phi, 1)
-                .integrals([&](double x, double y) { return table->drawn_density(theta, phi, x, y); },
-                           kQuick ? 200 : 400);
+        const auto shares = Cells(theta, phi, 1)
+                                .integrals([&](double x, double y) { return table->drawn_density(theta, phi, x, y); },
+                                           kQuick ? 200 : 400);
         EXPECT_NEAR(shares[0], 1, 4e-3) << theta << " " << phi;
       }
 }
@@ -111,8 +109,7 @@ TEST(Sampling, DrawnDensityIsTheQueried) {
         const auto drawn = table->draw(theta, phi, u[0], u[1]);
         ASSERT_TRUE(std::isfinite(drawn.x) && std::isfinite(drawn.y) && drawn.density > 0) << theta;
         ++all;
-        if (!(std::abs(table->drawn_density(theta, phi, drawn.x, drawn.y) / drawn.density - 1) < 1e-6))
-          ++apart;
+        if (!(std::abs(table->drawn_density(theta, phi, drawn.x, drawn.y) / drawn.density - 1) < 1e-6)) ++apart;
       }
     EXPECT_LE(apart, all / 1000) << table->description();
   }
@@ -124,8 +121,7 @@ TEST(Sampling, EndsAreDrawn) {
       for (const double u1 : {0.0, 1.0})
         for (const double u2 : {0.0, 1.0}) {
           const auto drawn = table->draw(theta, 1, u1, u2);
-          EXPECT_TRUE(std::isfinite(drawn.x) && std::isfinite(drawn.y) && std::isfinite(drawn.density))
-              << theta;
+          EXPECT_TRUE(std::isfinite(drawn.x) && std::isfinite(drawn.y) && std::isfinite(drawn.density)) << theta;
         }
 }
 

@@ -48,13 +48,13 @@ struct BenchOptions {
 struct BenchResult {
   Operation operation{};
   std::string distribution = "ggx", masking = "smith";
-  std::string sampler;  // "none" where the operation has no use for one
+  std::string sampler;              // "none" where the operation has no use for one
   double alpha_x = 0, alpha_y = 0;  // both 0: "mixed", different in every lane, evenly spread over [0.05, 1]^2
   std::string implementation;       // "scalar" | "auto" | "one-lane" | "simd" | "simd-threads" | "remote"
-  // How inputs are given: "columns" (everything per lane, all i_z > 0, columns placed kindly and used again and again), or
-  // the same but "malloc" (columns placed as malloc does), "fresh" (every batch in columns that no cache holds),
-  // "one-roughness" (one value for all lanes), "generator" (in-kernel random numbers) or "backfacing" (i_z < 0 in
-  // 10 % of lanes).
+  // How inputs are given: "columns" (everything per lane, all i_z > 0, columns placed kindly and used again and again),
+  // or the same but "malloc" (columns placed as malloc does), "fresh" (every batch in columns that no cache holds),
+  // "one-roughness" (one value for all lanes), "generator" (in-kernel random numbers) or "backfacing" (i_z < 0 in 10 %
+  // of lanes).
   std::string inputs;
   std::uint64_t batch = 0;
   int threads = 1;               // that compute on this machine; 0 for remote
@@ -71,8 +71,8 @@ struct BenchResult {
   double samples_per_second() const { return 1e9 / ns_per_sample; }
   double bytes_per_second() const { return bytes_per_sample * samples_per_second(); }
   double share_occluded() const { return static_cast<double>(rejected) / static_cast<double>(samples); }
-  // "operation/sampler/alpha_x,alpha_y/batch/implementation" ("mixed" for the roughness that is), and "/inputs" unless they are "columns". The sampler
-  // of other models than GGX with Smith is as bench_name() says.
+  // "operation/sampler/alpha_x,alpha_y/batch/implementation" ("mixed" for the roughness that is), and "/inputs" unless
+  // they are "columns". The sampler of other models than GGX with Smith is as bench_name() says.
   std::string name() const;
 };
 

@@ -107,8 +107,8 @@ struct Camera::State {
 
     const auto& triangle = mesh.triangles[query.hit.primID];
     const float u = query.hit.u, v = query.hit.v;
-    Vector normal = (1.0f - u - v) * mesh.normals[triangle[0]] + u * mesh.normals[triangle[1]] +
-                    v * mesh.normals[triangle[2]];
+    Vector normal =
+        (1.0f - u - v) * mesh.normals[triangle[0]] + u * mesh.normals[triangle[1]] + v * mesh.normals[triangle[2]];
     const Vector geometric = {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z};
     // Both sides of a triangle are the same surface: its normals are those on the viewer's side.
     const Vector facing = dot(geometric, direction) < 0.0f ? geometric : -1.0f * geometric;
@@ -150,8 +150,8 @@ absl::StatusOr<std::unique_ptr<Camera>> Camera::create(Mesh mesh) {
   if (!state->device) return absl::InternalError(absl::StrCat("Embree: error ", rtcGetDeviceError(nullptr)));
   RTCGeometry geometry = rtcNewGeometry(state->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   // Embree reads vertices 16 bytes at a time, so it gets its own padded copies.
-  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                           sizeof(Vector), state->mesh.positions.size());
+  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vector),
+                                           state->mesh.positions.size());
   void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                           3 * sizeof(std::uint32_t), state->mesh.triangles.size());
   if (vertices && indices) {
@@ -176,8 +176,7 @@ Camera::~Camera() = default;
 
 Lanes Camera::trace(std::size_t lanes) {
   Lanes result;
-  for (auto* column :
-       {&result.incident_x, &result.incident_y, &result.incident_z, &result.alpha_x, &result.alpha_y})
+  for (auto* column : {&result.incident_x, &result.incident_y, &result.incident_z, &result.alpha_x, &result.alpha_y})
     column->reserve(lanes);
   while (result.size() < lanes) {
     if (state_->used == state_->waiting.size()) state_->pass();

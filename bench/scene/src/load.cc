@@ -12,8 +12,7 @@
 namespace facetwise::scene {
 namespace {
 
-constexpr const char* kDefaultMesh =
-    "/usr/share/assimp/models/glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb";
+constexpr const char* kDefaultMesh = "/usr/share/assimp/models/glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb";
 
 // Appends the meshes of a node and of those below it: a mesh that several nodes name is an instance in each.
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, Mesh& mesh) {
@@ -33,8 +32,7 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
     for (unsigned f = 0; f < source.mNumFaces; ++f) {
       const aiFace& face = source.mFaces[f];
       if (face.mNumIndices != 3) continue;
-      mesh.triangles.push_back(
-          {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+      mesh.triangles.push_back({first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
       mesh.parts.push_back(node.mMeshes[k]);
     }
   }
@@ -57,8 +55,7 @@ absl::StatusOr<Mesh> load_mesh(const std::string& path) {
 
 absl::StatusOr<std::string> default_mesh() {
   if (std::filesystem::exists(kDefaultMesh)) return kDefaultMesh;
-  return absl::NotFoundError(
-      absl::StrCat(kDefaultMesh, ": not found; it comes with Debian's assimp-testmodels"));
+  return absl::NotFoundError(absl::StrCat(kDefaultMesh, ": not found; it comes with Debian's assimp-testmodels"));
 }
 
 }  // namespace facetwise::scene

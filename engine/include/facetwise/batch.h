@@ -83,9 +83,9 @@ struct Batch {
   // If given, only these lanes are read and written, in any order, each at most once. Indices < lanes.
   std::optional<std::span<const std::uint32_t>> active{};
 
-  Direction incident{};                  // i
-  Direction outgoing{};                  // o, for queries
-  Column<float> alpha_x{}, alpha_y{};    // roughness, [1e-4, 10]
+  Direction incident{};                // i
+  Direction outgoing{};                // o, for queries
+  Column<float> alpha_x{}, alpha_y{};  // roughness, [1e-4, 10]
   // Optional, where the model takes them (else 0). Mean slope of the normals (LEADR: Dupuy et al. 2013; Heitz &
   // d'Eon 2014, section 4), and the correlation rho in (-1, 1) that makes the slopes' covariance proportional to
   // [[ax^2, rho ax ay], [rho ax ay, ay^2]]. Smith masking with ggx, beckmann or table.
@@ -138,8 +138,8 @@ struct OutputField {
   unsigned operations;
 };
 
-// The samplers that a model has for an operation's draws or pdf, whatever columns are given; empty where the model itself
-// makes no sense, and for masking.
+// The samplers that a model has for an operation's draws or pdf, whatever columns are given; empty where the model
+// itself makes no sense, and for masking.
 std::vector<Sampler> samplers_for(Operation, const Model&);
 // `exact` where the batch's model and columns have it for the operation, else `visible`.
 Sampler default_sampler(Operation, const Batch&);

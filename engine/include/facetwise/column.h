@@ -20,8 +20,7 @@ class Column {
   Column(const T* values, std::size_t count, std::size_t stride = sizeof(T))
       : data_(values), count_(count), stride_(stride), over_memory_(true) {}
   template <std::ranges::contiguous_range Range>
-    requires std::is_same_v<std::ranges::range_value_t<Range>, T>
-  Column(const Range& values)  // NOLINT: implicit
+  requires std::is_same_v<std::ranges::range_value_t<Range>, T> Column(const Range& values)  // NOLINT: implicit
       : Column(std::ranges::data(values), std::ranges::size(values)) {}
 
   bool present() const { return over_memory_ || count_ == 1; }
@@ -52,8 +51,7 @@ class OutputColumn {
   OutputColumn(T* values, std::size_t count, std::size_t stride = sizeof(T))
       : data_(values), count_(count), stride_(stride), present_(true) {}
   template <std::ranges::contiguous_range Range>
-    requires std::is_same_v<std::ranges::range_value_t<Range>, T>
-  OutputColumn(Range& values)  // NOLINT: implicit
+  requires std::is_same_v<std::ranges::range_value_t<Range>, T> OutputColumn(Range& values)  // NOLINT: implicit
       : OutputColumn(std::ranges::data(values), std::ranges::size(values)) {}
 
   bool present() const { return present_; }

@@ -7,11 +7,12 @@
 
 namespace facetwise {
 
-// Some columns of as many floats each, in one piece of memory, uninitialised. Each begins at a cache line, and no two have
-// the same lane at the same place of their pages, nor nearly: such columns take turns in one set of the first-level
-// cache, and the processor takes the store of one for a store to another that it is about to read. Columns from malloc
-// all lie at one place of their pages, and neighbours in one large array do if its length is a multiple of 1,024. Large
-// ones are on large pages where the system has them (Linux, madvise). docs/benchmarks.md has what it is worth.
+// Some columns of as many floats each, in one piece of memory, uninitialised. Each begins at a cache line, and no two
+// have the same lane at the same place of their pages, nor nearly: such columns take turns in one set of the
+// first-level cache, and the processor takes the store of one for a store to another that it is about to read. Columns
+// from malloc all lie at one place of their pages, and neighbours in one large array do if its length is a multiple of
+// 1,024. Large ones are on large pages where the system has them (Linux, madvise). docs/benchmarks.md has what it is
+// worth.
 class ColumnMemory {
  public:
   ColumnMemory() = default;

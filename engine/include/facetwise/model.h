@@ -98,10 +98,10 @@ struct Model {
 //             the refracted one, and the normal (0, 0, 1) are returned with pdf 0, since the density is a delta.
 //             The weight is the delta's own (F or 1 - F, 1 for a conductor) where i_z > 0, else 0; value is 0;
 //             masking has the limit's values. So is a transmission with eta = 1, which goes straight on.
-//   invalid   an input is NaN or infinite, alpha < 0 or a principal roughness above the distribution's largest (10; Phong 1),
-//             |slope_correlation| >= 1, a mean slope beyond +-100, eta outside [0.01, 100], f0 or f90 outside [0, 1], u outside [0, 1), or a
-//             direction is not of unit length (| |v|^2 - 1 | > 1e-3; inside that it is used as it is). All
-//             outputs are 0.
+//   invalid   an input is NaN or infinite, alpha < 0 or a principal roughness above the distribution's largest (10;
+//             Phong 1), |slope_correlation| >= 1, a mean slope beyond +-100, eta outside [0.01, 100], f0 or f90 outside
+//             [0, 1], u outside [0, 1), or a direction is not of unit length (| |v|^2 - 1 | > 1e-3; inside that it is
+//             used as it is). All outputs are 0.
 enum class LaneStatus : std::uint8_t { accepted = 0, occluded = 1, smooth = 2, invalid = 3 };
 
 // What a scattering sample did at its microfacet.

@@ -56,16 +56,15 @@ class SlopeTable {
 
   // Calls p22 on this thread alone, at the grid's nodes; it may throw. The same machine makes the same bits
   // with any threads; another's sine may differ in the last place: to have one table, share its file.
-  static absl::StatusOr<std::shared_ptr<const SlopeTable>> build(const SlopeDensity& p22,
-                                                                 const Options& options);
+  static absl::StatusOr<std::shared_ptr<const SlopeTable>> build(const SlopeDensity& p22, const Options& options);
 
   // Densities at nx times ny equidistant slopes, x fastest; linear in between, 0 outside.
   struct Range {
     double from, to;
   };
-  static absl::StatusOr<std::shared_ptr<const SlopeTable>> from_grid(std::span<const double> values,
-                                                                     std::size_t nx, std::size_t ny, Range x,
-                                                                     Range y, const Options& options);
+  static absl::StatusOr<std::shared_ptr<const SlopeTable>> from_grid(std::span<const double> values, std::size_t nx,
+                                                                     std::size_t ny, Range x, Range y,
+                                                                     const Options& options);
 
   // A table as bytes. parse() refuses what serialise() did not write.
   std::string serialise() const;
@@ -74,8 +73,7 @@ class SlopeTable {
   static absl::StatusOr<std::shared_ptr<const SlopeTable>> load(const std::string& path);
   // A saved table, or text: the line "facetwise-slopes 1 nx ny x_min x_max y_min y_max", then from_grid()'s
   // values, apart by spaces or lines. `options` are for text.
-  static absl::StatusOr<std::shared_ptr<const SlopeTable>> load_any(const std::string& path,
-                                                                    const Options& options);
+  static absl::StatusOr<std::shared_ptr<const SlopeTable>> load_any(const std::string& path, const Options& options);
 
   const SlopeTableView& view() const { return view_; }
   bool radial() const { return view_.azimuths == 0; }

@@ -2,11 +2,10 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/distributions/beckmann.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
-
 #include "hwy/highway.h"
+#include "src/kernels/beckmann_exact-inl.h"
 #include "src/kernels/register-inl.h"
 #include "src/kernels/smith-inl.h"
-#include "src/kernels/beckmann_exact-inl.h"
 #include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -2,10 +2,9 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/distributions/phong.cc"
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
-
 #include "hwy/highway.h"
-#include "src/kernels/register-inl.h"
 #include "src/kernels/phong-inl.h"
+#include "src/kernels/register-inl.h"
 #include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -1,5 +1,5 @@
-// Beckmann: pi P22 = e^(-r^2). With k = w_z / sqrt(A) the projected area is 2 sigma = sqrt(A) (k erfc(-k) + e^(-k^2) / sqrt(pi)); for
-// k < 0 it is sqrt(A) e^(-k^2) tail(-k), tail as in erf-inl.h. There densities and areas are kept times
+// Beckmann: pi P22 = e^(-r^2). With k = w_z / sqrt(A) the projected area is 2 sigma = sqrt(A) (k erfc(-k) + e^(-k^2) /
+// sqrt(pi)); for k < 0 it is sqrt(A) e^(-k^2) tail(-k), tail as in erf-inl.h. There densities and areas are kept times
 // e^(shift), shift = k^2.
 
 #if defined(FACETWISE_BECKMANN_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -99,11 +99,12 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
     y = NormalSlope(d, u2, one - u2);
   }
 
-  // The x with a share u of the visible slopes below, and t = k - x; their density is (k - x) e^(-x^2), x < k. With X = |x| and
-  // the functions of erf-inl.h, the integral below x is
+  // The x with a share u of the visible slopes below, and t = k - x; their density is (k - x) e^(-x^2), x < k. With X =
+  // |x| and the functions of erf-inl.h, the integral below x is
   //   (1/2) e^(-X^2) (tail(X) + t erfcx(X)) for x < 0,   k - (1/2) e^(-X^2) (t erfcx(X) - tail(X)) for x > 0,
   // and in all k + (1/2) e^(-k^2) tail(k), for k < 0 (1/2) e^(-k^2) tail(-k), by which e^(-X^2) is then divided
-  // before it is formed: k^2 - X^2 = -t (t - 2 k). Of x and t the smaller is kept to all digits: x for k > 1. Three Halley steps; error of the share 1e-6.
+  // before it is formed: k^2 - X^2 = -t (t - 2 k). Of x and t the smaller is kept to all digits: x for k > 1. Three
+  // Halley steps; error of the share 1e-6.
   template <class D, class V = Vec<D>>
   static HWY_NOINLINE void VisibleSlope(D d, V k, V u, V& x, V& t) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
@@ -162,8 +163,8 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
     }
   }
 
-  // V-cavity behind, k = |i_z| / sqrt(A): H = (S(k) - S(3 k)) / (2 k) with S(x) = e^(-x^2) tail(x), times e^(k^2). For small k its
-  // series, 1 + sum of c_n k^(2 n - 1) (1 - 9^n) / 2, c_n = (-1)^(n + 1) / (sqrt(pi) n! (2 n - 1)).
+  // V-cavity behind, k = |i_z| / sqrt(A): H = (S(k) - S(3 k)) / (2 k) with S(x) = e^(-x^2) tail(x), times e^(k^2). For
+  // small k its series, 1 + sum of c_n k^(2 n - 1) (1 - 9^n) / 2, c_n = (-1)^(n + 1) / (sqrt(pi) n! (2 n - 1)).
   template <class D, class I, class V = Vec<D>>
   static HWY_NOINLINE void TwoHit(D d, const I& i, V& two_hit, V& shift) {
     V root, erfcx, tail, erfcx3, tail3;
@@ -179,8 +180,8 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
     two_hit = Select(k < Set(d, 0.25f), near, far);
     shift = IfThenElseZero(Not(i.front), k2);
   }
-  // Tokuyoshi 2021, listings 1, 4 and 5: the first part are slopes below 3 k (k < 0), the second visible ones between 3 k
-  // and k.
+  // Tokuyoshi 2021, listings 1, 4 and 5: the first part are slopes below 3 k (k < 0), the second visible ones between 3
+  // k and k.
   template <class D, class I, class V = Vec<D>>
   static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
     const V one = Set(d, 1.0f), two = Set(d, 2.0f), half = Set(d, 0.5f);
@@ -219,7 +220,8 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
 
  private:
   // c_n (1 - 9^n), n = 8 ... 1.
-  static constexpr float kHitSeries[] = {40.1562682f, -41.1859085f, 37.8576909f, -30.8465431f, 22.0302599f, -13.6910006f, 7.52252778f, -4.51351667f};
+  static constexpr float kHitSeries[] = {40.1562682f, -41.1859085f, 37.8576909f, -30.8465431f,
+                                         22.0302599f, -13.6910006f, 7.52252778f, -4.51351667f};
 };
 
 }  // namespace HWY_NAMESPACE

@@ -1,6 +1,6 @@
-// Beckmann's visible normals whose reflection is not occluded, nearly in proportion, for i_z > 0: docs/math.md. Slopes are
-// rotated into the plane of incidence. There x is a visible slope between x_a and x_b, and y a normal one between the ends of
-// the ellipse's chord at x.
+// Beckmann's visible normals whose reflection is not occluded, nearly in proportion, for i_z > 0: docs/math.md. Slopes
+// are rotated into the plane of incidence. There x is a visible slope between x_a and x_b, and y a normal one between
+// the ends of the ellipse's chord at x.
 
 #if defined(FACETWISE_BECKMANN_EXACT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_BECKMANN_EXACT_INL_H_
@@ -20,11 +20,11 @@ template <class D>
 struct Ellipse {
   using V = Vec<D>;
   Incidence<D> w;
-  V k;             // cot of the stretched incidence
+  V k;  // cot of the stretched incidence
   V xa, xb;
   V m12, m22, kappa;
-  V fa, fb;        // shares of the visible slopes below xa and xb
-  V area;          // i_z (C_b - C_a)
+  V fa, fb;  // shares of the visible slopes below xa and xb
+  V area;    // i_z (C_b - C_a)
 
   template <class I>
   HWY_INLINE Ellipse(D d, const I& i) : w(d, i) {

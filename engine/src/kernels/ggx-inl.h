@@ -37,8 +37,8 @@ struct Ggx : DistributionTraits {
     scale = front;
   }
 
-  // pi ax ay D(m) for m of any length: q^2 with q = |m|^2 (ax ay)^2 / ((m_x ay)^2 + (m_y ax)^2 + (m_z ax ay)^2). Needs |m|^2 above
-  // 2^-40, where nothing underflows.
+  // pi ax ay D(m) for m of any length: q^2 with q = |m|^2 (ax ay)^2 / ((m_x ay)^2 + (m_y ax)^2 + (m_z ax ay)^2). Needs
+  // |m|^2 above 2^-40, where nothing underflows.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V Density(D, const I& i, V mx, V my, V mz, V m2, V) {
     Centre(i, mx, my, mz);
@@ -84,9 +84,9 @@ struct Ggx : DistributionTraits {
     const V two_a = a + a;
     two_hit = (two_a / (r1 + k) + two_a / (r3 + k3)) / (r1 + r3);
   }
-  // Tokuyoshi 2021, listings 1 to 3, for c < 0. With a share 2 s / H the normal, drawn in proportion to m_hat_z, faces the
-  // direction with 3 c instead of c; else it is a visible one that does not. Both as in `heitz` (ggx_samplers-inl.h) with
-  // another s; the second ends at L = -(1 + 2 c^2) / r, r^2 = 1 + 8 c^2.
+  // Tokuyoshi 2021, listings 1 to 3, for c < 0. With a share 2 s / H the normal, drawn in proportion to m_hat_z, faces
+  // the direction with 3 c instead of c; else it is a visible one that does not. Both as in `heitz`
+  // (ggx_samplers-inl.h) with another s; the second ends at L = -(1 + 2 c^2) / r, r^2 = 1 + 8 c^2.
   template <class D, class I, class V = Vec<D>>
   static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
     const V one = Set(d, 1.0f), half = Set(d, 0.5f), two = Set(d, 2.0f), three = Set(d, 3.0f);

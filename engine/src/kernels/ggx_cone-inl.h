@@ -1,5 +1,5 @@
-// The cone of GGX's unoccluded normals, for i_z > 0. Derivation: docs/math.md, "The exact reflection sampler"; the symbols are those
-// used there.
+// The cone of GGX's unoccluded normals, for i_z > 0. Derivation: docs/math.md, "The exact reflection sampler"; the
+// symbols are those used there.
 
 #if defined(FACETWISE_GGX_CONE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_GGX_CONE_INL_H_
@@ -19,13 +19,13 @@ template <class D>
 struct Cone {
   using V = Vec<D>;
   HWY_INLINE Cone() {}
-  V lambda;                  // the form's positive eigenvalue
-  V g;                       // w.v; lambda itself without a mean slope
-  V px, py;                  // i_z ax^2, i_z ay^2
-  V inverse_p, inverse_q;    // 1/P, 1/Q: P = lambda + px, Q = lambda + py
-  V vx, vy;                  // the axis (v_x, v_y, 1)
-  V inverse_n2;              // 1 / v.v
-  V two_k;                   // 2 K = 2 lambda g / (n2 sqrt(P Q))
+  V lambda;                // the form's positive eigenvalue
+  V g;                     // w.v; lambda itself without a mean slope
+  V px, py;                // i_z ax^2, i_z ay^2
+  V inverse_p, inverse_q;  // 1/P, 1/Q: P = lambda + px, Q = lambda + py
+  V vx, vy;                // the axis (v_x, v_y, 1)
+  V inverse_n2;            // 1 / v.v
+  V two_k;                 // 2 K = 2 lambda g / (n2 sqrt(P Q))
 };
 
 // One Halley step for the root of f(l) = l - h - x2 / P - y2 / Q, given 1/P and 1/Q at l. `ratio` is about

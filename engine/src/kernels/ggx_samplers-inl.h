@@ -84,7 +84,7 @@ HWY_INLINE void DrawFromCap(D d, const I& i, V t, V above, V u1, V u2, Drawn<D>&
   const V height = t * u1;  // nu (1 - o_hat_z)
   const V radius = Sqrt(height * (i.nu + i.nu - height));
   const V hx = Fma(radius, cos, i.wx), hy = Fma(radius, sin, i.wy);
-  V hz = Fma(t, Set(d, 1.0f) - u1, above);  // nu + i_z - height, without cancellation
+  V hz = Fma(t, Set(d, 1.0f) - u1, above);             // nu + i_z - height, without cancellation
   if (!i.all_front) hz = Max(hz, Set(d, kSmallestZ));  // t can be very small
   Unstretch(i, hx, hy, hz, drawn);
   // Equal to |m_hat|^2 / 2, but by M itself, so that o is its reflection even where m_hat is short.

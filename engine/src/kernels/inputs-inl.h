@@ -35,8 +35,7 @@ struct Inputs {
       mean_x = LoadU(d, tile.in[kMeanX] + lane);
       mean_y = LoadU(d, tile.in[kMeanY] + lane);
       const V correlation = LoadU(d, tile.in[kCorrelation] + lane), largest = Set(d, kLargestMeanSlope);
-      affine_valid =
-          And(And(Abs(mean_x) <= largest, Abs(mean_y) <= largest), Abs(correlation) < Set(d, 1.0f));
+      affine_valid = And(And(Abs(mean_x) <= largest, Abs(mean_y) <= largest), Abs(correlation) < Set(d, 1.0f));
       rotation = PrincipalAxes(d, correlation, ax, ay);
       rotation.In(x, y);
       rotation.In(mean_x, mean_y);
@@ -81,7 +80,6 @@ struct Inputs {
     if constexpr (S::kAffine) rotation.Out(x_, y_);
   }
 };
-
 
 // What samples read besides.
 template <class D, class S, bool kUsesU3>

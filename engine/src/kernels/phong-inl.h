@@ -1,5 +1,5 @@
-// Anisotropic Phong: D = m_z^n / (pi ax ay) with n = 2 cos^2 / ax^2 + 2 sin^2 / ay^2 - 2 of m's azimuth. Of a standard slope of
-// length rho whose actual length is r, pi P22 = (1 + r^2)^-(1 + rho^2 / r^2).
+// Anisotropic Phong: D = m_z^n / (pi ax ay) with n = 2 cos^2 / ax^2 + 2 sin^2 / ay^2 - 2 of m's azimuth. Of a standard
+// slope of length rho whose actual length is r, pi P22 = (1 + r^2)^-(1 + rho^2 / r^2).
 
 #if defined(FACETWISE_PHONG_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_PHONG_INL_H_
@@ -29,8 +29,8 @@ struct Phong : SlopeDistribution<Phong>, DistributionTraits {
     return Exp(d, Neg((r2 + rho2) * ratio));
   }
 
-  // Given the azimuth e of the standard slope, (1 + r^2)^-(1 / a) is uniform, a = ax^2 e_x^2 + ay^2 e_y^2 = r^2 / rho^2; e itself is
-  // uniform.
+  // Given the azimuth e of the standard slope, (1 + r^2)^-(1 / a) is uniform, a = ax^2 e_x^2 + ay^2 e_y^2 = r^2 /
+  // rho^2; e itself is uniform.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void DrawSlope(D d, const I& i, V u1, V u2, V& x, V& y) {
     V sin, cos;

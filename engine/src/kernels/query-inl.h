@@ -70,7 +70,8 @@ struct Query {
       S::Masking::Value(d, i, mz, im, x, y, z, tile.uncorrelated, two_n, w);
       V value = Min(density / (denominator * two_n), largest) * IfThenElseZero(above, w);
       if constexpr (S::Masking::kUnboundedW) value = Min(value, largest);
-      if (tile.interface != Interface::conductor) value = value * interface.Reflectance(d, tile, Sqrt(m2) * Set(d, 0.5f));
+      if (tile.interface != Interface::conductor)
+        value = value * interface.Reflectance(d, tile, Sqrt(m2) * Set(d, 0.5f));
       Store(d, tile, kOutValue, lane, exceptions.Output(value, zero));
     }
     exceptions.Finish(tile, lane, Or(Not(above), S::Masking::SeesNothing(d, i)), statistics);

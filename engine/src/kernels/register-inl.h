@@ -16,15 +16,13 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 // A surface's kernels for vectors D, one sampler after the other. Pairs: the tag for samplers with a long chain, which
-// gain by 15 % from pairs, and for all sampling where the distribution's areas are long; the others lose up to 9 % by them where
-// registers are few.
+// gain by 15 % from pairs, and for all sampling where the distribution's areas are long; the others lose up to 9 % by
+// them where registers are few.
 template <class S, class D, class Pairs = D>
 struct Registrar {
   SurfaceKernels kernels{};
 
-  constexpr Registrar() {
-    kernels.masking = ForEachVector<D, MaskingOf<D, S>>;
-  }
+  constexpr Registrar() { kernels.masking = ForEachVector<D, MaskingOf<D, S>>; }
   template <class Drawer>
   constexpr Registrar& Add(Sampler sampler) {
     const auto index = static_cast<std::size_t>(sampler);
@@ -55,9 +53,9 @@ HWY_AFTER_NAMESPACE();
 
 // Defines k<Name> and kOneLane<Name> from a template Make<Name><D, Pairs>() that gives DistributionKernels.
 #undef FACETWISE_REGISTER
-#define FACETWISE_REGISTER(Name)                                                     \
-  extern const DistributionKernels k##Name;                                          \
-  extern const DistributionKernels kOneLane##Name;                                   \
+#define FACETWISE_REGISTER(Name)                                                                           \
+  extern const DistributionKernels k##Name;                                                                \
+  extern const DistributionKernels kOneLane##Name;                                                         \
   const DistributionKernels k##Name = Make##Name<hn::ScalableTag<float>, Twice<hn::ScalableTag<float>>>(); \
   const DistributionKernels kOneLane##Name = Make##Name<hn::CappedTag<float, 1>, hn::CappedTag<float, 1>>();
 

@@ -1,4 +1,5 @@
-// A dielectric's two events at a microfacet: reflection and transmission (Walter 2007), chosen by u3 or forced to transmit.
+// A dielectric's two events at a microfacet: reflection and transmission (Walter 2007), chosen by u3 or forced to
+// transmit.
 //
 // c = i.m; g = eta cos of the refracted direction; F the reflectance. The refracted direction is
 // o = (-i + (c - g) m) / eta, where c - g = (1 - eta^2) / (c + g) does not cancel, and
@@ -152,7 +153,8 @@ struct Scatter {
     Store(d, tile, kOutBranch, lane, exceptions.Output(branch, mirror.branch));
     const V scale_t = tile.importance ? one : loaded_eta * loaded_eta;
     const auto transmits = And(accepted, Not(reflects));
-    Store(d, tile, kOutEtaScale, lane, exceptions.Output(Select(transmits, scale_t, one), Select(mirror.reflects, one, scale_t)));
+    Store(d, tile, kOutEtaScale, lane,
+          exceptions.Output(Select(transmits, scale_t, one), Select(mirror.reflects, one, scale_t)));
     if (tile.event != nullptr) {
       const V event = exceptions.Output(IfThenElseZero(transmits, one), IfThenElseZero(Not(mirror.reflects), one));
       const Rebind<int32_t, D> di;
@@ -240,7 +242,7 @@ struct ScatterQuery {
     const V dot_i = Dot(hx, hy, hz, i.x, i.y, i.z), dot_o = Dot(hx, hy, hz, x, y, z);
     // A reflection's half vector points up and faces both; o = -i has none.
     auto reached = Select2(reflects, And(straight, h2 > Set(d, 0x1p-40f)),
-                           And(And(And(z < zero, hz > zero), And(dot_i > zero, dot_o < zero)), h2 > Set(d, 1e-30f)));
+                           And(And(And(z<zero, hz> zero), And(dot_i > zero, dot_o < zero)), h2 > Set(d, 1e-30f)));
     if (tile.transmits) reached = And(reached, Not(reflects));
     if (!i.all_front) reached = AndNot(S::Masking::SeesNothing(d, i), reached);
 

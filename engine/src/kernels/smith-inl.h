@@ -31,13 +31,13 @@ struct Smith {
 
   // w = f cos(theta_o) / pdf_visible(o), as numerator and denominator, for o_z > 0. With z' of o,
   // Lambda(o) = sigma(-o) / z'(o), so that
-  //   correlated    sigma(i) / (sigma(i) + |z'(i)| Lambda(o)) = 2 sigma(i) z'(o) / (2 sigma(i) z'(o) + |z'(i)| 2 sigma(-o))
+  //   correlated    sigma(i) / (sigma(i) + |z'(i)| Lambda(o))
+  //                 = 2 sigma(i) z'(o) / (2 sigma(i) z'(o) + |z'(i)| 2 sigma(-o))
   //   uncorrelated  G1(o) = 2 z'(o) / (2 sigma(o))
   // Nothing cancels, in front or behind. z'(o) is taken as 2^-60 at least, where no product underflows; where it is not
   // positive w is 0.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void Shadowing(D d, const I& i, V ox, V oy, V oz, bool uncorrelated, V& numerator,
-                                   V& denominator) {
+  static HWY_INLINE void Shadowing(D d, const I& i, V ox, V oy, V oz, bool uncorrelated, V& numerator, V& denominator) {
     using Distribution = typename I::Distribution;
     const V wx = i.ax * ox, wy = i.ay * oy;
     const V a = Fma(wx, wx, wy * wy);

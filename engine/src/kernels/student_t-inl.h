@@ -1,6 +1,6 @@
-// Student-t of gamma = 3: pi P22 = 8 / (2 + r^2)^3. With slopes measured by sqrt(2) alpha it is 2 / (1 + r^2)^3, the normals of a
-// sphere weighted by 2 m_hat_z^2, and all is algebraic: for w so stretched, of length nu,
-// 2 sigma = (nu + w_z)^2 / (2 nu).
+// Student-t of gamma = 3: pi P22 = 8 / (2 + r^2)^3. With slopes measured by sqrt(2) alpha it is 2 / (1 + r^2)^3, the
+// normals of a sphere weighted by 2 m_hat_z^2, and all is algebraic: for w so stretched, of length nu, 2 sigma = (nu +
+// w_z)^2 / (2 nu).
 
 #if defined(FACETWISE_STUDENT_T_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_STUDENT_T_INL_H_
@@ -74,11 +74,12 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     return half * Fma(v, v, v);  // 1 - v^2 = (1 - v)(1 + v), 1 - v = half v
   }
 
-  // In the frame stretched by sqrt(2) alpha, x = (t - 1/t) / 2; x's largest value has t = T = (1 + c) / s. The share below
-  // t = T z is
+  // In the frame stretched by sqrt(2) alpha, x = (t - 1/t) / 2; x's largest value has t = T = (1 + c) / s. The share
+  // below t = T z is
   //   F(z) = z^3 ((T^2 - 1) z (3 + T^2 z^2) + 4) (1 + T^2) / (1 + T^2 z^2)^3,
   // solved by three Halley steps: error of F 6e-7. They start from the solutions for T = 1 and T = infinity in
-  // q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's share is that of a fixed density.
+  // q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's share is that of a fixed
+  // density.
   template <class D, class I, class V = Vec<D>>
   static HWY_NOINLINE void DrawVisible(D d, const I& i, V c_i, V s_i, V u1, V u2, V& x, V& y, V& gap) {
     const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f);
@@ -132,8 +133,8 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   }
 
  private:
-  // The y with density 8 / (3 pi (1 + y^2)^3) and share u below. Both tails fall with y^-5: y is (1 - u)^(-1/5) - u^(-1/5)
-  // times a smooth function of (4 u (1 - u))^(1/5), fitted by a polynomial. Error of the share 2e-7.
+  // The y with density 8 / (3 pi (1 + y^2)^3) and share u below. Both tails fall with y^-5: y is (1 - u)^(-1/5) -
+  // u^(-1/5) times a smooth function of (4 u (1 - u))^(1/5), fitted by a polynomial. Error of the share 2e-7.
   template <class D, class V = Vec<D>>
   static HWY_INLINE V Conditional(D d, V u) {
     const V low = Max(u, Set(d, 0x1p-26f)), high = Set(d, 1.0f) - u;

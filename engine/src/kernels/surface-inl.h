@@ -28,9 +28,9 @@ inline constexpr float kPi = 3.14159265358979f;
 inline constexpr float kLengthTolerance = 1e-3f;  // of |v|^2 of a direction
 inline constexpr float kLargestDensity = 3e38f;   // one can be beyond the floats straight below a smooth surface
 inline constexpr float kLargestBelowOne = 1 - 0x1p-24f;
-inline constexpr float kTiny = 0x1p-60f;          // stands for a cosine or a share of 0 in quotients
-inline constexpr float kHorizon = 0x1p-30f;       // stands for a cosine of 0 where it is squared
-inline constexpr float kVertical = 1e-15f;        // a shorter (x, y) has no azimuth
+inline constexpr float kTiny = 0x1p-60f;     // stands for a cosine or a share of 0 in quotients
+inline constexpr float kHorizon = 0x1p-30f;  // stands for a cosine of 0 where it is squared
+inline constexpr float kVertical = 1e-15f;   // a shorter (x, y) has no azimuth
 
 // Where w is straight below no normal is visible and sigma is 0. Behind the surface A is taken as this at least,
 // as if w were tilted by 3e-8, so that densities stay finite.
@@ -39,11 +39,11 @@ inline constexpr float kSmallestA = 0x1p-50f;
 // What a distribution is unless it says otherwise.
 struct DistributionTraits {
   static constexpr float kLargestRoughness = kLargestAlpha;
-  static constexpr bool kShifts = false;        // densities and areas are kept times e^(shift)
-  static constexpr bool kLongChains = false;    // sampling gains from pairs of vectors
-  static constexpr bool kOwnMean = false;       // the table's mean slope is added to the batch's
-  static constexpr bool kHasShareUnoccluded = false;      // ShareUnoccluded() is known
-  static constexpr bool kCavityBehind = false;  // V-cavity has samplers for i_z <= 0
+  static constexpr bool kShifts = false;              // densities and areas are kept times e^(shift)
+  static constexpr bool kLongChains = false;          // sampling gains from pairs of vectors
+  static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
+  static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
+  static constexpr bool kCavityBehind = false;        // V-cavity has samplers for i_z <= 0
 };
 
 // Distribution: a policy as described in docs/adding.md.
@@ -65,14 +65,14 @@ struct Incident {
   V ax, ay;
   V mean_x, mean_y;  // if the surface is affine
   V wx, wy, wz;
-  V a;      // A
-  V nu;     // length of w
+  V a;               // A
+  V nu;              // length of w
   V two_sigma;       // 2 sigma(i), times exp(shift)
   V two_normaliser;  // the same as densities are normalised: Normalisation
-  V shift;  // of distributions whose sigma underflows: density and area are both kept times exp(shift)
-  Mask<D> front;  // i_z > 0
-  Mask<D> ahead;  // w_z > 0
-  bool all_front;  // both, in all lanes
+  V shift;           // of distributions whose sigma underflows: density and area are both kept times exp(shift)
+  Mask<D> front;     // i_z > 0
+  Mask<D> ahead;     // w_z > 0
+  bool all_front;    // both, in all lanes
   const SlopeTableView* table;
 };
 
@@ -147,9 +147,9 @@ struct Rotation {
   }
 };
 
-// To the principal axes of [[ax^2, rho ax ay], [rho ax ay, ay^2]], each to the nearer one: ax and ay become the roots of the
-// eigenvalues there. With half difference g, covariance c and R = |(g, c)| the eigenvalues are mean +- R, and the axes are half the
-// angle of (|g|, c) away.
+// To the principal axes of [[ax^2, rho ax ay], [rho ax ay, ay^2]], each to the nearer one: ax and ay become the roots
+// of the eigenvalues there. With half difference g, covariance c and R = |(g, c)| the eigenvalues are mean +- R, and
+// the axes are half the angle of (|g|, c) away.
 template <class D, class V = Vec<D>>
 HWY_INLINE Rotation<D> PrincipalAxes(D d, V rho, V& ax, V& ay) {
   const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);

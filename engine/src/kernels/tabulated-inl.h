@@ -1,8 +1,9 @@
-// Tabulated distributions: docs/tables.md. Samples have the density of what the interpolated tables draw, so N follows from that:
-// for a density p of standard normals m_hat (unit), p(m) is p (|m| / |m_hat|)^3 / (ax ay) and 2 N = 2 i.m D_hat / (p |m_hat|).
+// Tabulated distributions: docs/tables.md. Samples have the density of what the interpolated tables draw, so N follows
+// from that: for a density p of standard normals m_hat (unit), p(m) is p (|m| / |m_hat|)^3 / (ax ay) and 2 N = 2 i.m
+// D_hat / (p |m_hat|).
 //
-// Smith masking needs normals whose mean slope is that which the batch gives. A table's own is added to it, so that slopes here are
-// centred, and taken off where the tables are looked up.
+// Smith masking needs normals whose mean slope is that which the batch gives. A table's own is added to it, so that
+// slopes here are centred, and taken off where the tables are looked up.
 
 #if defined(FACETWISE_TABULATED_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_TABULATED_INL_H_
@@ -48,8 +49,7 @@ struct Tabulated : DistributionTraits {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Seen(D d, const I& i, V wx, V wy, V wz, V& c, V& s, V& ex, V& ey, V& nu) {
     const V one = Set(d, 1.0f);
-    if constexpr (I::Surface::kAffine)
-      wz = Fma(wx, Set(d, i.table->mean_x), Fma(wy, Set(d, i.table->mean_y), wz));
+    if constexpr (I::Surface::kAffine) wz = Fma(wx, Set(d, i.table->mean_x), Fma(wy, Set(d, i.table->mean_y), wz));
     const V a = Fma(wx, wx, wy * wy);
     const V horizontal = Sqrt(a);
     const Azimuth<D> azimuth(d, wx, wy, horizontal);

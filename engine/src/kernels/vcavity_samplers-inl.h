@@ -14,8 +14,8 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// Visible normals: one of a normal and its mirror image, by how much they face i (Heitz & d'Eon 2014, section 3); behind,
-// the distribution's DrawBehindCavity (Tokuyoshi 2021, section 2.3).
+// Visible normals: one of a normal and its mirror image, by how much they face i (Heitz & d'Eon 2014, section 3);
+// behind, the distribution's DrawBehindCavity (Tokuyoshi 2021, section 2.3).
 struct CavityVisible : SlopeNormals, VisibleNormals {
   static constexpr bool kUsesU3 = true;
 

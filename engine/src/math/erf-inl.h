@@ -56,8 +56,8 @@ HWY_INLINE void ErfcxAndTail(D d, V x, V& erfcx, V& tail) {
   tail = q * (inverse_c * inverse_c);
 }
 
-// e^(-x^2), 0 for |x| > 8, so that products with it are not denormal, which processors are slow at (nor what is split from x^2). x^2 is split,
-// so that the exponent's rounding loses no digits.
+// e^(-x^2), 0 for |x| > 8, so that products with it are not denormal, which processors are slow at (nor what is split
+// from x^2). x^2 is split, so that the exponent's rounding loses no digits.
 template <class D, class V = Vec<D>>
 HWY_INLINE V Gauss(D d, V x) {
   const auto visible = Abs(x) <= Set(d, 8.0f);

@@ -30,7 +30,8 @@ HWY_INLINE V Exp(D d, V x) {
   const V lowest = Set(d, -86.0f);
   const auto vanishes = x < lowest;
   x = Min(Max(x, lowest), Set(d, 88.0f));
-  // x = n log(2) + r, |r| <= log(2) / 2. Adding 1.5 * 2^23 rounds to the nearest integer, which is then the low bits of the sum.
+  // x = n log(2) + r, |r| <= log(2) / 2. Adding 1.5 * 2^23 rounds to the nearest integer, which is then the low bits of
+  // the sum.
   const V magic = Set(d, 12582912.0f);
   const V rounded = Fma(x, Set(d, 1.44269504f), magic);
   const V n = rounded - magic;

@@ -57,7 +57,7 @@ struct TagTraits<Twice<D>> {
 
 // Whether there are streaming stores: on x86, where two of these vectors fill a line at the least.
 template <class D>
-inline constexpr bool kStreams = HWY_ARCH_X86 && hn::MaxLanes(D()) >= 8;
+inline constexpr bool kStreams = HWY_ARCH_X86&& hn::MaxLanes(D()) >= 8;
 template <class D>
 inline constexpr bool kStreams<Twice<D>> = kStreams<D>;
 
@@ -70,10 +70,10 @@ template <class T, class D>
 using Rebind = typename TagTraits<D>::template Rebound<T>;
 
 // Operations on pairs: on each vector.
-#define FACETWISE_PAIRWISE(F)                                 \
-  template <class V>                                          \
-  HWY_INLINE auto F(Pair<V> x) -> Pair<decltype(F(x.a))> {    \
-    return {F(x.a), F(x.b)};                                  \
+#define FACETWISE_PAIRWISE(F)                            \
+  template <class V>                                     \
+  HWY_INLINE auto F(Pair<V> x)->Pair<decltype(F(x.a))> { \
+    return {F(x.a), F(x.b)};                             \
   }
 FACETWISE_PAIRWISE(Sqrt)
 FACETWISE_PAIRWISE(Abs)
@@ -81,10 +81,10 @@ FACETWISE_PAIRWISE(Neg)
 FACETWISE_PAIRWISE(Not)
 #undef FACETWISE_PAIRWISE
 
-#define FACETWISE_PAIRWISE(F)                                                \
-  template <class V, class W>                                                \
-  HWY_INLINE auto F(Pair<V> x, Pair<W> y) -> Pair<decltype(F(x.a, y.a))> {   \
-    return {F(x.a, y.a), F(x.b, y.b)};                                       \
+#define FACETWISE_PAIRWISE(F)                                            \
+  template <class V, class W>                                            \
+  HWY_INLINE auto F(Pair<V> x, Pair<W> y)->Pair<decltype(F(x.a, y.a))> { \
+    return {F(x.a, y.a), F(x.b, y.b)};                                   \
   }
 FACETWISE_PAIRWISE(operator+)
 FACETWISE_PAIRWISE(operator-)
@@ -216,17 +216,17 @@ HWY_INLINE V Select(M condition, V yes, V no) {
   return IfThenElse(condition, yes, no);
 }
 
-#define FACETWISE_PAIRWISE(F)                                       \
-  template <class M, class V>                                       \
-  HWY_INLINE Pair<V> F(Pair<M> x, Pair<V> y, Pair<V> z) {           \
-    return {F(x.a, y.a, z.a), F(x.b, y.b, z.b)};                    \
+#define FACETWISE_PAIRWISE(F)                             \
+  template <class M, class V>                             \
+  HWY_INLINE Pair<V> F(Pair<M> x, Pair<V> y, Pair<V> z) { \
+    return {F(x.a, y.a, z.a), F(x.b, y.b, z.b)};          \
   }
 FACETWISE_PAIRWISE(Select)
 #undef FACETWISE_PAIRWISE
-#define FACETWISE_PAIRWISE(F)                                       \
-  template <class V>                                                \
-  HWY_INLINE Pair<V> F(Pair<V> x, Pair<V> y, Pair<V> z) {           \
-    return {F(x.a, y.a, z.a), F(x.b, y.b, z.b)};                    \
+#define FACETWISE_PAIRWISE(F)                             \
+  template <class V>                                      \
+  HWY_INLINE Pair<V> F(Pair<V> x, Pair<V> y, Pair<V> z) { \
+    return {F(x.a, y.a, z.a), F(x.b, y.b, z.b)};          \
   }
 FACETWISE_PAIRWISE(Fma)
 FACETWISE_PAIRWISE(NegFma)

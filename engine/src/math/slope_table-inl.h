@@ -78,8 +78,7 @@ struct TableIncident {
     return TablePlace<D>(d, angle * Set(d, 0.25f * static_cast<float>(azimuths)), azimuths + 1);
   }
   HWY_INLINE TablePlace<D> At(D d, std::int32_t nodes) const {
-    return TablePlace<D>(d, (Set(d, 1.0f) - reach * Set(d, 0.5f)) * Set(d, static_cast<float>(nodes - 1)),
-                         nodes);
+    return TablePlace<D>(d, (Set(d, 1.0f) - reach * Set(d, 0.5f)) * Set(d, static_cast<float>(nodes - 1)), nodes);
   }
 };
 
@@ -90,12 +89,9 @@ struct TableRow {
   std::int32_t next, turn;  // to the neighbouring row, and to that of the next azimuth, 0 if there is none
   TableIndex<D> offset, nearest;
   V outer, azimuth;
-  HWY_INLINE TableRow(D d, const SlopeTableView& view, const float* from, std::int32_t rows,
-                      const TablePlace<D>& place, const TableIncident<D>& incident)
-      : table(from),
-        next(view.uniforms + 1),
-        turn(view.azimuths == 0 ? 0 : rows * next),
-        outer(place.weight) {
+  HWY_INLINE TableRow(D d, const SlopeTableView& view, const float* from, std::int32_t rows, const TablePlace<D>& place,
+                      const TableIncident<D>& incident)
+      : table(from), next(view.uniforms + 1), turn(view.azimuths == 0 ? 0 : rows * next), outer(place.weight) {
     const Rebind<std::int32_t, D> di{};
     const V half = Set(d, 0.5f), one = Set(d, 1.0f);
     offset = place.cell * Set(di, next);
@@ -104,16 +100,14 @@ struct TableRow {
     if (turn == 0) return;
     azimuth = incident.azimuth.weight;
     offset = offset + incident.azimuth.cell * Set(di, turn);
-    nearest = nearest +
-              (incident.azimuth.cell + ConvertTo(di, IfThenElseZero(azimuth > half, one))) * Set(di, turn);
+    nearest = nearest + (incident.azimuth.cell + ConvertTo(di, IfThenElseZero(azimuth > half, one))) * Set(di, turn);
   }
   HWY_INLINE V At(D d, TableIndex<D> node) const {
     const TableIndex<D> at = offset + node;
     const V here = Between(GatherIndex(d, table, at), GatherIndex(d, table + next, at), outer);
     if (turn == 0) return here;
     const float* turned = table + turn;
-    return Between(here, Between(GatherIndex(d, turned, at), GatherIndex(d, turned + next, at), outer),
-                   azimuth);
+    return Between(here, Between(GatherIndex(d, turned, at), GatherIndex(d, turned + next, at), outer), azimuth);
   }
   // In the nearest row.
   HWY_INLINE V Nearest(D d, TableIndex<D> node) const { return GatherIndex(d, table, nearest + node); }
@@ -182,13 +176,12 @@ HWY_INLINE TableRow<D> SideRow(D d, const SlopeTableView& view, const TableIncid
 
 // A visible normal m, m_z > 0, and the density per solid angle with which the tables draw it.
 template <class D, class V = Vec<D>>
-HWY_NOINLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
-                                  V sin_phi, V u1, V u2, V& mx, V& my, V& mz, V& density) {
+HWY_NOINLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi,
+                                    V u1, V u2, V& mx, V& my, V& mz, V& density) {
   const V one = Set(d, 1.0f), two = Set(d, 2.0f), least = Set(d, 0x1p-22f);
   const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
   V tilt, side;
-  const V rise =
-      Max(DrawFrom(d, TiltRow(d, view, incident), view.uniforms, u1, tilt) * incident.reach, least);
+  const V rise = Max(DrawFrom(d, TiltRow(d, view, incident), view.uniforms, u1, tilt) * incident.reach, least);
   const V s = rise - one;
   const V square = Fma(s, s, one);
   const V cos_chi = Max(rise * (two - rise) / square, least);
@@ -206,8 +199,8 @@ HWY_NOINLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta
 
 // The density of DrawVisibleNormal() at a unit m: 0 where m_z <= 0 or m faces away from i.
 template <class D, class V = Vec<D>>
-HWY_NOINLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
-                                  V sin_phi, V mx, V my, V mz) {
+HWY_NOINLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi,
+                                    V mx, V my, V mz) {
   const V one = Set(d, 1.0f), zero = Zero(d);
   const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
   const V along = Neg(Fma(cos_phi, mx, sin_phi * my));
@@ -224,8 +217,8 @@ HWY_NOINLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta
 
 // The same by slopes: x, y = -m_xy / m_z, densities per area of slopes.
 template <class D, class V = Vec<D>>
-HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
-                                 V sin_phi, V u1, V u2, V& x, V& y, V& density) {
+HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi, V u1,
+                                 V u2, V& x, V& y, V& density) {
   V mx, my, mz;
   DrawVisibleNormal(d, view, cos_theta, sin_theta, cos_phi, sin_phi, u1, u2, mx, my, mz, density);
   x = Neg(mx / mz);
@@ -233,12 +226,11 @@ HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V
   density = density * mz * mz * mz;
 }
 template <class D, class V = Vec<D>>
-HWY_INLINE V VisibleSlopeDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi,
-                                 V sin_phi, V x, V y) {
+HWY_INLINE V VisibleSlopeDensity(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi, V x,
+                                 V y) {
   const V one = Set(d, 1.0f);
   const V mz = one / Sqrt(Fma(x, x, Fma(y, y, one)));
-  const V density =
-      VisibleNormalDensity(d, view, cos_theta, sin_theta, cos_phi, sin_phi, Neg(x * mz), Neg(y * mz), mz);
+  const V density = VisibleNormalDensity(d, view, cos_theta, sin_theta, cos_phi, sin_phi, Neg(x * mz), Neg(y * mz), mz);
   return density * mz * mz * mz;
 }
 
@@ -250,12 +242,10 @@ HWY_INLINE V NormalDensity(D d, const SlopeTableView& view, V mx, V my, V mz) {
   const float last = static_cast<float>(view.grid - 1);
   if (view.azimuths == 0) {
     const TablePlace<D> at(d, Sqrt(Fma(mx, mx, my * my)) * scale * Set(d, last), view.grid);
-    return Between(GatherIndex(d, view.density, at.cell), GatherIndex(d, view.density + 1, at.cell),
-                   at.weight);
+    return Between(GatherIndex(d, view.density, at.cell), GatherIndex(d, view.density + 1, at.cell), at.weight);
   }
   const V half = Set(d, 0.5f * last);
-  const TablePlace<D> x(d, NegFma(mx, scale, one) * half, view.grid),
-      y(d, NegFma(my, scale, one) * half, view.grid);
+  const TablePlace<D> x(d, NegFma(mx, scale, one) * half, view.grid), y(d, NegFma(my, scale, one) * half, view.grid);
   const TableIndex<D> at = y.cell * Set(di, view.grid) + x.cell;
   const float *low = view.density, *high = view.density + view.grid;
   return Between(Between(GatherIndex(d, low, at), GatherIndex(d, low + 1, at), x.weight),

@@ -58,8 +58,7 @@ Real over_unoccluded(const Surface& surface, Vector i, Real tolerance, const F& 
         0, nearest - low, tolerance);
     return before + integrate_ray(at, nearest, high, falls_over(surface, low), tolerance);
   };
-  if (start.x != 0 || start.y != 0)
-    return integrate_azimuths(along, std::atan2(-start.y, -start.x), 1, tolerance * 4);
+  if (start.x != 0 || start.y != 0) return integrate_azimuths(along, std::atan2(-start.y, -start.x), 1, tolerance * 4);
   const Real peak = w.z < 0 ? 1 / (1 - w.z / std::max<Real>(horizontal, 1e-30L)) : 1;
   return integrate_azimuths(along, std::atan2(w.y, w.x), peak, tolerance * 4);
 }
@@ -78,9 +77,8 @@ double share_unoccluded(const Surface& surface, Vector i) {
 double albedo(const Surface& surface, Vector i) {
   i = turned(surface, i);
   if (sees_nothing(surface, i)) return 0;
-  return static_cast<double>(over_unoccluded(surface, i, 1e-9L, [&](Vector m, Real im, Vector o) {
-    return reflected(surface, i, o, m, im) * 4 * im;
-  }));
+  return static_cast<double>(over_unoccluded(
+      surface, i, 1e-9L, [&](Vector m, Real im, Vector o) { return reflected(surface, i, o, m, im) * 4 * im; }));
 }
 
 }  // namespace facetwise::reference

@@ -55,8 +55,7 @@ Vector sample_cone(const Cone& cone, Roughness alpha, Vector i, double u1, doubl
   const double y = -d / cone.n2;
   // 1 - xi^2 - eta^2 with 1 - lambda / P = i_z alpha_x^2 / P, so that nothing cancels at the rim.
   const double cp = cos * cos / cone.p, sq = sin * sin / cone.q;
-  const double inside =
-      (1 - u1) * cone.lambda * (cp + sq) + i.z * (alpha.x * alpha.x * cp + alpha.y * alpha.y * sq);
+  const double inside = (1 - u1) * cone.lambda * (cp + sq) + i.z * (alpha.x * alpha.x * cp + alpha.y * alpha.y * sq);
   const double zeta = std::sqrt((inside + d * d / cone.n2) / cone.n2);
   const double g = cone.lambda;
   const double s = u3 * 2 * g * zeta < g * zeta + xi * w.x + eta * w.y + g * y ? 1 : -1;

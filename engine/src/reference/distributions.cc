@@ -36,8 +36,8 @@ Real area_by_quadrature(const Surface& surface, Stretched w, Real tolerance) {
     };
     return integrate_ray(f, low, high, falls_over(surface, low), tolerance);
   };
-  return integrate_azimuths(along, std::atan2(w.y, w.x),
-                            std::min<Real>(1, std::max<Real>(std::abs(w.z) / a, 0.1L)), tolerance);
+  return integrate_azimuths(along, std::atan2(w.y, w.x), std::min<Real>(1, std::max<Real>(std::abs(w.z) / a, 0.1L)),
+                            tolerance);
 }
 
 // To about 1e-10 of the area, which is small behind.
@@ -73,26 +73,21 @@ Slope standard_slope(const Surface& surface, Vector m) {
 
 LongNormal normal_of(const Surface& surface, Slope s) {
   return {-(surface.mean_slope_x + surface.alpha.x * s.x),
-          -(surface.mean_slope_y +
-            surface.alpha.y * (surface.slope_correlation * s.x + independent(surface) * s.y))};
+          -(surface.mean_slope_y + surface.alpha.y * (surface.slope_correlation * s.x + independent(surface) * s.y))};
 }
 
 Scaled standard_density(const Surface& surface, Slope s) {
   const Real r2 = s.x * s.x + s.y * s.y;
   switch (surface.model.distribution) {
-    case Distribution::ggx:
-      return {1 / (kPi * (1 + r2) * (1 + r2)), 0};
-    case Distribution::beckmann:
-      return {1 / kPi, -r2};
-    case Distribution::student_t:
-      return {8 / (kPi * (2 + r2) * (2 + r2) * (2 + r2)), 0};
+    case Distribution::ggx: return {1 / (kPi * (1 + r2) * (1 + r2)), 0};
+    case Distribution::beckmann: return {1 / kPi, -r2};
+    case Distribution::student_t: return {8 / (kPi * (2 + r2) * (2 + r2) * (2 + r2)), 0};
     case Distribution::phong: {
       // m_z^(n + 4) with m_z^-2 = 1 + p and n + 2 = 2 r^2 / p, where p = |slope|^2.
       const Real x = surface.alpha.x * s.x, y = surface.alpha.y * s.y, p = x * x + y * y;
       return {1 / kPi, p == 0 ? 0 : -std::log1p(p) * (1 + r2 / p)};
     }
-    case Distribution::table:
-      return {surface.table_density(static_cast<double>(s.x), static_cast<double>(s.y)), 0};
+    case Distribution::table: return {surface.table_density(static_cast<double>(s.x), static_cast<double>(s.y)), 0};
   }
   return {};
 }
@@ -108,8 +103,7 @@ Scaled normal_density(const Surface& surface, Vector m) {
 Scaled area(const Surface& surface, Stretched w) {
   const Real a2 = w.x * w.x + w.y * w.y;
   switch (surface.model.distribution) {
-    case Distribution::ggx:
-      return {half_sum(a2, w.z), 0};
+    case Distribution::ggx: return {half_sum(a2, w.z), 0};
     case Distribution::beckmann: {
       if (a2 == 0) return {std::max<Real>(w.z, 0), 0};
       const Real a = std::sqrt(a2), t = w.z / a;
@@ -120,13 +114,10 @@ Scaled area(const Surface& surface, Stretched w) {
       const Real half = half_sum(2 * a2, w.z), nu = std::sqrt(2 * a2 + w.z * w.z);
       return {nu == 0 ? 0 : half * half / nu, 0};
     }
-    case Distribution::phong:
-      return {area_by_quadrature(surface, w), 0};
+    case Distribution::phong: return {area_by_quadrature(surface, w), 0};
     case Distribution::table:
       if (surface.table_area)
-        return {surface.table_area(
-                    {static_cast<double>(w.x), static_cast<double>(w.y), static_cast<double>(w.z)}),
-                0};
+        return {surface.table_area({static_cast<double>(w.x), static_cast<double>(w.y), static_cast<double>(w.z)}), 0};
       return {area_by_quadrature(surface, w), 0};
   }
   return {};
@@ -137,9 +128,7 @@ double slope_density(const Surface& surface, double x, double y) {
                              slope_determinant(surface));
 }
 
-double distribution(const Surface& surface, Vector m) {
-  return static_cast<double>(value(normal_density(surface, m)));
-}
+double distribution(const Surface& surface, Vector m) { return static_cast<double>(value(normal_density(surface, m))); }
 
 double projected_area(const Surface& surface, Vector i) {
   return static_cast<double>(value(area(surface, stretched(surface, i))));

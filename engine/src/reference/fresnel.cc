@@ -9,15 +9,12 @@ namespace facetwise::reference {
 double fresnel(const Surface& surface, double cos) {
   const Real c = cos;
   switch (surface.model.interface) {
-    case Interface::conductor:
-      return 1;
+    case Interface::conductor: return 1;
     case Interface::schlick: {
       const Real u = 1 - c;
-      return static_cast<double>(surface.f0 +
-                                 (static_cast<Real>(surface.f90) - surface.f0) * u * u * u * u * u);
+      return static_cast<double>(surface.f0 + (static_cast<Real>(surface.f90) - surface.f0) * u * u * u * u * u);
     }
-    case Interface::dielectric:
-      break;
+    case Interface::dielectric: break;
   }
   // With g = eta cos(theta_t), g^2 = eta^2 - 1 + c^2: (c - g) / (c + g) and (eta^2 c - g) / (eta^2 c + g),
   // each difference replaced by that of the squares over the sum.

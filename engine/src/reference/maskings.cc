@@ -11,8 +11,7 @@ namespace facetwise::reference {
 
 bool sees_nothing(const Surface& surface, Vector i) {
   const Distribution d = surface.model.distribution;
-  return surface.model.masking == Masking::vcavity && i.z <= 0 && d != Distribution::ggx &&
-         d != Distribution::beckmann;
+  return surface.model.masking == Masking::vcavity && i.z <= 0 && d != Distribution::ggx && d != Distribution::beckmann;
 }
 
 double masking(const Surface& surface, Vector i) {
@@ -51,8 +50,7 @@ Scaled hits(const Surface& surface, Vector i) {
                   },
                   1, 3, 0),
               0};
-    default:
-      return {(value(area(surface, w)) - value(area(surface, {w.x, w.y, 3 * w.z}))) / z, 0};
+    default: return {(value(area(surface, w)) - value(area(surface, {w.x, w.y, 3 * w.z}))) / z, 0};
   }
 }
 
@@ -66,13 +64,10 @@ Scaled smith_normaliser(const Surface& surface, Vector i) {
   return area(surface, w);
 }
 
-double hit_probability(const Surface& surface, Vector i) {
-  return static_cast<double>(value(hits(surface, i)));
-}
+double hit_probability(const Surface& surface, Vector i) { return static_cast<double>(value(hits(surface, i))); }
 
 double normaliser(const Surface& surface, Vector i) {
-  if (surface.model.masking == Masking::smith)
-    return static_cast<double>(value(smith_normaliser(surface, i)));
+  if (surface.model.masking == Masking::smith) return static_cast<double>(value(smith_normaliser(surface, i)));
   return static_cast<double>(value(vcavity_hits(surface, i)) * std::abs(i.z));
 }
 

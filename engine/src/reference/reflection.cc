@@ -62,8 +62,8 @@ Real sampled_density(const Surface& surface, Sampler sampler, Vector i, Vector m
 
 Real reflected(const Surface& surface, Vector i, Vector o, Vector m, Real im) {
   if (o.z <= 0 || sees_nothing(surface, i)) return 0;
-  const Real weight = surface.model.masking == Masking::smith ? smith_shadowing(surface, i, o)
-                                                              : vcavity_shadowing(i, o, m, im);
+  const Real weight =
+      surface.model.masking == Masking::smith ? smith_shadowing(surface, i, o) : vcavity_shadowing(i, o, m, im);
   if (weight == 0) return 0;
   return fresnel(surface, static_cast<double>(im)) * weight * visible_density(surface, i, m, im) / (4 * im);
 }

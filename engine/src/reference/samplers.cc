@@ -73,10 +73,8 @@ Vector sample_cap(Roughness alpha, Vector i, double k, double u1, double u2) {
 
 Vector sample_stretched(Sampler sampler, Roughness alpha, Vector i, double u1, double u2, double u3) {
   switch (sampler) {
-    case Sampler::ndf:
-      return sample_ndf(u1, u2);
-    case Sampler::heitz:
-      return sample_heitz(alpha, i, u1, u2);
+    case Sampler::ndf: return sample_ndf(u1, u2);
+    case Sampler::heitz: return sample_heitz(alpha, i, u1, u2);
     case Sampler::bounded:
       if (i.z > 0) return sample_cap(alpha, i, bound(alpha, i), u1, u2);
       break;
@@ -84,8 +82,7 @@ Vector sample_stretched(Sampler sampler, Roughness alpha, Vector i, double u1, d
       if (i.z > 0) return sample_cone(unoccluded_cone(alpha, i), alpha, i, u1, u2, u3);
       break;
     case Sampler::visible:
-    case Sampler::cap:
-      break;
+    case Sampler::cap: break;
   }
   return sample_cap(alpha, i, 1, u1, u2);
 }

@@ -45,8 +45,7 @@ Sampler of_normals(Sampler sampler) { return sampler == Sampler::ndf ? sampler :
 
 double share(const Surface& surface, Real im, bool reflects, bool transmits, bool reflection) {
   const double f = fresnel(surface, static_cast<double>(im));
-  const double reflected = reflects ? f : 0, transmitted = transmits ? 1 - f : 0,
-               sum = reflected + transmitted;
+  const double reflected = reflects ? f : 0, transmitted = transmits ? 1 - f : 0, sum = reflected + transmitted;
   if (sum == 0) return 0;
   return (reflection ? reflected : transmitted) / sum;
 }
@@ -91,8 +90,7 @@ double pdf_scattering(const Surface& surface, Sampler sampler, Vector i, Vector 
   if (o.z < 0) {
     const Refraction r = refraction(surface, i, o);
     if (!r.exists() || surface.model.interface != Interface::dielectric) return 0;
-    return pdf_transmission(surface, sampler, i, o) *
-           share(surface, r.im, reflects(i, r.m, r.im), true, false);
+    return pdf_transmission(surface, sampler, i, o) * share(surface, r.im, reflects(i, r.m, r.im), true, false);
   }
   const Vector from = turned(surface, i), h = from + o;
   if (o.z <= 0 || h.z <= 0) return 0;

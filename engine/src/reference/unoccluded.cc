@@ -17,16 +17,8 @@ struct Principal {
 };
 
 Principal principal(const Surface& surface, Vector i, Vector m) {
-  Principal p{surface.alpha.x,
-              surface.alpha.y,
-              surface.mean_slope_x,
-              surface.mean_slope_y,
-              i.x,
-              i.y,
-              i.z,
-              m.x,
-              m.y,
-              m.z};
+  Principal p{
+      surface.alpha.x, surface.alpha.y, surface.mean_slope_x, surface.mean_slope_y, i.x, i.y, i.z, m.x, m.y, m.z};
   if (surface.slope_correlation == 0) return p;
   const Real ax = p.ax, ay = p.ay, covariance = surface.slope_correlation * ax * ay;
   const Real difference = (ax - ay) * (ax + ay) / 2;
@@ -55,19 +47,14 @@ Real vcavity_density(const Surface& surface, Vector i, Vector m, Real im) {
   const Real far = (std::abs(q) + std::sqrt(q * q + a)) / a, near = 1 / (a * far);
   Real within = 0;  // P(radius < far)
   switch (surface.model.distribution) {
-    case Distribution::ggx:
-      within = far * far / (1 + far * far);
-      break;
-    case Distribution::beckmann:
-      within = -std::expm1(-far * far);
-      break;
+    case Distribution::ggx: within = far * far / (1 + far * far); break;
+    case Distribution::beckmann: within = -std::expm1(-far * far); break;
     case Distribution::student_t: {
       const Real f2 = far * far;
       within = f2 / (2 + f2) * ((4 + f2) / (2 + f2));
       break;
     }
-    default:
-      return std::numeric_limits<Real>::quiet_NaN();
+    default: return std::numeric_limits<Real>::quiet_NaN();
   }
   // im / (i_z m_z) is 1 - q r.
   const Real w = r > near ? 2 : std::clamp<Real>(im / (iz * m.z), 0, 2);
@@ -90,8 +77,8 @@ Real beckmann_density(const Surface& surface, Vector i, Vector m, Real im) {
   if (x <= low || x >= high) return 0;
   // Integral of (1 - t x) exp(-x^2) / sqrt(pi).
   const Scaled share = gaussian_interval(low, high);
-  const Real tail = t * std::numbers::inv_sqrtpi_v<Real> / 2 * std::exp(-high * high) *
-                    -std::expm1((high - low) * (high + low));
+  const Real tail =
+      t * std::numbers::inv_sqrtpi_v<Real> / 2 * std::exp(-high * high) * -std::expm1((high - low) * (high + low));
   const Real weight = value(share) + tail;
   const Real spread = std::sqrt(m22 * kappa * (x - low) * (high - x));
   const Scaled y = gaussian_interval((-m12 * x - spread) / m22, (-m12 * x + spread) / m22);

@@ -47,9 +47,8 @@ absl::Status evaluate(const SlopeDensity& p22, const TableSizes& sizes, std::spa
     const double to_slope = 2 / (1 - wx * wx - wy * wy), x = wx * to_slope, y = wy * to_slope;
     const double value = p22(x, y);
     if (!std::isfinite(value) || value < 0)
-      return absl::InvalidArgumentError(
-          absl::StrCat("p22: ", std::isfinite(value) ? "negative" : "not finite", " at slope (", x, ", ", y,
-                       "): ", value));
+      return absl::InvalidArgumentError(absl::StrCat("p22: ", std::isfinite(value) ? "negative" : "not finite",
+                                                     " at slope (", x, ", ", y, "): ", value));
     const double squared = 1 + x * x + y * y;
     values[k] = value * squared * squared;
     if (!std::isfinite(values[k]))
@@ -72,18 +71,15 @@ absl::Status check_radial(const SlopeDensity& p22, const TableSizes& sizes, std:
     const double w = static_cast<double>(node) / (sizes.grid - 1), r = 2 * w / (1 - w * w), here = p22(r, 0);
     for (const auto& [cos, sin] : {Azimuth{-1, 0}, Azimuth{0, 1}, Azimuth{0, -1}, Azimuth{0.6, 0.8}})
       if (const double there = p22(r * cos, r * sin); !(std::abs(there - here) <= 0.05 * here))
-        return absl::InvalidArgumentError(absl::StrCat("radial: p22 is ", here, " at slope (", r, ", 0) and ",
-                                                       there, " at (", r * cos, ", ", r * sin,
-                                                       "); build without it"));
+        return absl::InvalidArgumentError(absl::StrCat("radial: p22 is ", here, " at slope (", r, ", 0) and ", there,
+                                                       " at (", r * cos, ", ", r * sin, "); build without it"));
   }
   return absl::OkStatus();
 }
 
 // Gauss-Legendre, 4 points on [0, 1].
-constexpr double kPoint[] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281,
-                             0.9305681557970263};
-constexpr double kWeight[] = {0.17392742256872692, 0.32607257743127308, 0.32607257743127308,
-                              0.17392742256872692};
+constexpr double kPoint[] = {0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263};
+constexpr double kWeight[] = {0.17392742256872692, 0.32607257743127308, 0.32607257743127308, 0.17392742256872692};
 
 // The integral of D m_z over the hemisphere, that is of P22: cell by cell of the grid.
 double integral(const SlopeTableView& view) {
@@ -212,12 +208,10 @@ class Builder {
     // Costs: of one evaluation of the density, and of one of the marginal.
     const double look = static_cast<double>(sides_), fold = static_cast<double>(steps_) / 2;
     const std::size_t tilts = tilts_ + 1;
-    Work work(progress,
-              static_cast<double>(turns()) * (look * static_cast<double>(tilts) + fold / 4 * sizes_.areas) +
-                  static_cast<double>(rows()) * (2 * look * sizes_.slopes + fold * sizes_.incidence));
+    Work work(progress, static_cast<double>(turns()) * (look * static_cast<double>(tilts) + fold / 4 * sizes_.areas) +
+                            static_cast<double>(rows()) * (2 * look * sizes_.slopes + fold * sizes_.incidence));
     work.each(turns() * tilts, look, [&](std::size_t k) { make_marginal(k / tilts, k % tilts); });
-    work.each(turns() * sizes_.areas, fold / 4,
-              [&](std::size_t k) { make_area(k / sizes_.areas, k % sizes_.areas); });
+    work.each(turns() * sizes_.areas, fold / 4, [&](std::size_t k) { make_area(k / sizes_.areas, k % sizes_.areas); });
     work.each(rows() * sizes_.incidence, fold,
               [&](std::size_t k) { make_tilt(k / sizes_.incidence, k % sizes_.incidence); });
     work.each(rows() * sizes_.slopes, 2 * look,
@@ -302,12 +296,10 @@ class Builder {
     const std::size_t n = 2 * sides_;
     std::vector<double> density(n + 1), nodes(sizes_.uniforms + 1);
     const auto fill = [&](const auto& value) {
-      for (std::size_t j = 1; j < n; ++j)
-        density[j] = value(cos_psi_[j], sin_psi_[j]) * cos_psi_[j] * cos_psi_[j];
+      for (std::size_t j = 1; j < n; ++j) density[j] = value(cos_psi_[j], sin_psi_[j]) * cos_psi_[j] * cos_psi_[j];
       return invert(density, sizes_.uniforms, nodes);
     };
-    if (!fill([&](double c, double h) { return look(frame, s, c, h); }))
-      fill([](double, double) { return 1.0; });
+    if (!fill([&](double c, double h) { return look(frame, s, c, h); })) fill([](double, double) { return 1.0; });
     for (double& node : nodes) node = std::sin(pi * (node - 0.5));
     store(nodes, -1, 1, side_ + (row * sizes_.slopes + k) * (sizes_.uniforms + 1));
   }
@@ -334,8 +326,7 @@ class Builder {
 
 }  // namespace
 
-absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::build(const SlopeDensity& p22,
-                                                                    const Options& options) {
+absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::build(const SlopeDensity& p22, const Options& options) {
   if (!p22) return absl::InvalidArgumentError("p22: empty");
   const TableSizes sizes = sizes_of(options);
   if (auto status = check_sizes(sizes); !status.ok()) return status;
@@ -355,9 +346,8 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::build(const SlopeD
   return SlopeTableMaker::make(sizes, std::move(values));
 }
 
-absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::from_grid(std::span<const double> values,
-                                                                        std::size_t nx, std::size_t ny,
-                                                                        Range x, Range y,
+absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::from_grid(std::span<const double> values, std::size_t nx,
+                                                                        std::size_t ny, Range x, Range y,
                                                                         const Options& options) {
   const auto wrong = [](auto... parts) { return absl::InvalidArgumentError(absl::StrCat(parts...)); };
   if (nx < 2 || ny < 2) return wrong("values: ", nx, " times ", ny, " slopes; at least 2 times 2 are needed");

@@ -44,8 +44,7 @@ absl::Status of_file(const std::string& path, const absl::Status& status) {
 // What builders make: kernels need no more than sizes in order, but a sample needs rows that rise.
 absl::Status check_values(const TableSizes& sizes, std::span<const float> values) {
   for (std::size_t k = 0; k < sizes.density() + sizes.area(); ++k)
-    if (!std::isfinite(values[k]) || values[k] < 0)
-      return invalid("a density or area of ", values[k], "; rebuild it");
+    if (!std::isfinite(values[k]) || values[k] < 0) return invalid("a density or area of ", values[k], "; rebuild it");
   const auto rows = values.subspan(sizes.density() + sizes.area());
   const std::size_t nodes = std::size_t{sizes.uniforms} + 1;
   for (std::size_t row = 0; row < rows.size(); row += nodes) {
@@ -59,8 +58,7 @@ absl::Status check_values(const TableSizes& sizes, std::span<const float> values
 
 absl::StatusOr<std::string> read_file(const std::string& path) {
   std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr)
-    return absl::NotFoundError(absl::StrCat(path, ": cannot open: ", std::strerror(errno)));
+  if (file == nullptr) return absl::NotFoundError(absl::StrCat(path, ": cannot open: ", std::strerror(errno)));
   std::string bytes;
   char block[1 << 16];
   for (std::size_t n; (n = std::fread(block, 1, sizeof block, file)) > 0;) bytes.append(block, n);
@@ -94,16 +92,15 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> build_text(std::string_view te
   SlopeTable::Range x{}, y{};
   if (!read_number(text, version) || version != 1)
     return invalid("the first line is not \"facetwise-slopes 1 nx ny x_min x_max y_min y_max\"");
-  if (!read_number(text, nx) || !read_number(text, ny) || !read_number(text, x.from) ||
-      !read_number(text, x.to) || !read_number(text, y.from) || !read_number(text, y.to))
+  if (!read_number(text, nx) || !read_number(text, ny) || !read_number(text, x.from) || !read_number(text, x.to) ||
+      !read_number(text, y.from) || !read_number(text, y.to))
     return invalid("the first line needs \"nx ny x_min x_max y_min y_max\" after the version");
   // Each value is a digit and a space at least.
   if (nx == 0 || ny == 0 || nx > text.size() || ny > (text.size() / 2 + 1) / nx)
     return invalid("the first line announces ", nx, " times ", ny, " values, more than there are");
   std::vector<double> values(nx * ny);
   for (std::size_t k = 0; k < values.size(); ++k)
-    if (!read_number(text, values[k]))
-      return invalid("value ", k + 1, " of ", values.size(), " is not a number");
+    if (!read_number(text, values[k])) return invalid("value ", k + 1, " of ", values.size(), " is not a number");
   if (!next_word(text).empty()) return invalid("more than ", values.size(), " values");
   return SlopeTable::from_grid(values, nx, ny, x, y, options);
 }
@@ -129,8 +126,7 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::parse(std::string_
     return invalid("truncated: ", bytes.size(), " bytes; copy it again or rebuild it");
   std::memcpy(&header, bytes.data(), sizeof header);
   if (header.version != kVersion)
-    return invalid("version ", header.version, "; this facetwise reads version ", kVersion,
-                   ": rebuild the table");
+    return invalid("version ", header.version, "; this facetwise reads version ", kVersion, ": rebuild the table");
   if (auto status = check_sizes(header.sizes); !status.ok())
     return invalid("corrupted (", status.message(), "); copy it again or rebuild it");
   const std::size_t size = sizeof header + header.sizes.total() * sizeof(float) + sizeof hash;

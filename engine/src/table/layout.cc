@@ -12,8 +12,7 @@ namespace facetwise {
 absl::Status check_sizes(const TableSizes& sizes) {
   const auto within = [](const char* name, std::uint32_t value, std::uint32_t least, std::uint32_t most) {
     if (value >= least && value <= most) return absl::OkStatus();
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ": ", value, "; from ", least, " to ", most, " is possible"));
+    return absl::InvalidArgumentError(absl::StrCat(name, ": ", value, "; from ", least, " to ", most, " is possible"));
   };
   for (const absl::Status& status :
        {within("grid", sizes.grid, 5, 65537), within("areas", sizes.areas, 2, 65537),
@@ -21,25 +20,23 @@ absl::Status check_sizes(const TableSizes& sizes) {
         within("uniforms", sizes.uniforms, 4, 4096)})
     if (!status.ok()) return status;
   if (!std::has_single_bit(sizes.uniforms))
-    return absl::InvalidArgumentError(
-        absl::StrCat("uniforms: ", sizes.uniforms, "; a power of two is possible"));
+    return absl::InvalidArgumentError(absl::StrCat("uniforms: ", sizes.uniforms, "; a power of two is possible"));
   if (sizes.azimuths != 0) {
     if (auto status = within("azimuths", sizes.azimuths, 4, 4096); !status.ok()) return status;
     if (sizes.azimuths % 4 != 0)
-      return absl::InvalidArgumentError(
-          absl::StrCat("azimuths: ", sizes.azimuths, "; a multiple of 4 is possible"));
+      return absl::InvalidArgumentError(absl::StrCat("azimuths: ", sizes.azimuths, "; a multiple of 4 is possible"));
   }
   // Kernels count in 32 bits.
   if (sizes.total() > std::size_t{1} << 28)
-    return absl::InvalidArgumentError(absl::StrCat("options: a table of ", sizes.total() * sizeof(float),
-                                                   " bytes; at most 1 GiB is possible"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("options: a table of ", sizes.total() * sizeof(float), " bytes; at most 1 GiB is possible"));
   return absl::OkStatus();
 }
 
 namespace {
 
-// The mean slope, cell by cell of the grid. By w: slope = 2 w / (1 - w^2), m_z dm = 4 (1 - w^2) / (1 + w^2)^3 dw, whose product
-// is finite at the rim.
+// The mean slope, cell by cell of the grid. By w: slope = 2 w / (1 - w^2), m_z dm = 4 (1 - w^2) / (1 + w^2)^3 dw, whose
+// product is finite at the rim.
 void set_mean(SlopeTableView& view) {
   if (view.azimuths == 0) return;
   double sum_x = 0, sum_y = 0, sum = 0;
@@ -76,12 +73,10 @@ std::shared_ptr<const SlopeTable> SlopeTableMaker::make(const TableSizes& sizes,
   view.azimuths = static_cast<std::int32_t>(sizes.azimuths);
   set_mean(view);
   table->id_ = fnv1a(table->values_.data(), table->bytes(), fnv1a(&sizes, sizeof sizes));
-  table->description_ = sizes.azimuths == 0
-                            ? absl::StrCat("radial, grid ", sizes.grid)
-                            : absl::StrCat("azimuths ", sizes.azimuths, ", grid ", sizes.grid);
-  absl::StrAppend(&table->description_, ", incidence ", sizes.incidence, ", slopes ", sizes.slopes,
-                  ", uniforms ", sizes.uniforms, ", ", table->bytes(), " bytes, id ",
-                  absl::Hex(table->id_, absl::kZeroPad16));
+  table->description_ = sizes.azimuths == 0 ? absl::StrCat("radial, grid ", sizes.grid)
+                                            : absl::StrCat("azimuths ", sizes.azimuths, ", grid ", sizes.grid);
+  absl::StrAppend(&table->description_, ", incidence ", sizes.incidence, ", slopes ", sizes.slopes, ", uniforms ",
+                  sizes.uniforms, ", ", table->bytes(), " bytes, id ", absl::Hex(table->id_, absl::kZeroPad16));
   return table;
 }
 
@@ -97,14 +92,10 @@ Azimuth azimuth_node(std::size_t row, std::size_t n) {
   const double p = static_cast<double>(row % quarter) / static_cast<double>(quarter);
   const double length = std::hypot(1 - p, p), c = (1 - p) / length, s = p / length;
   switch (row / quarter % 4) {
-    case 0:
-      return {c, s};
-    case 1:
-      return {-s, c};
-    case 2:
-      return {-c, -s};
-    default:
-      return {s, -c};
+    case 0: return {c, s};
+    case 1: return {-s, c};
+    case 2: return {-c, -s};
+    default: return {s, -c};
   }
 }
 

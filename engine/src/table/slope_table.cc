@@ -23,9 +23,7 @@ class Row {
         azimuth_(azimuth.weight) {}
 
   double operator[](std::size_t k) const {
-    const auto at = [&](const float* p) {
-      return double{p[k]} + outer_ * (double{p[k + next_]} - double{p[k]});
-    };
+    const auto at = [&](const float* p) { return double{p[k]} + outer_ * (double{p[k + next_]} - double{p[k]}); };
     const double here = at(first_);
     return turn_ == 0 ? here : here + azimuth_ * (at(first_ + turn_) - here);
   }
@@ -84,12 +82,9 @@ Row tilt_row(const SlopeTableView& view, const Frame& f) {
 }
 Row side_row(const SlopeTableView& view, const Frame& f, double rise) {
   const auto n = static_cast<std::size_t>(view.slopes);
-  return {view.side,
-          n,
-          static_cast<std::size_t>(view.uniforms),
-          place(rise / 2 * (view.slopes - 1), n),
-          f.azimuth,
-          view.azimuths == 0};
+  return {
+      view.side,         n, static_cast<std::size_t>(view.uniforms), place(rise / 2 * (view.slopes - 1), n), f.azimuth,
+      view.azimuths == 0};
 }
 
 }  // namespace

@@ -15,9 +15,7 @@ namespace {
 using wire::MessageReader;
 using wire::MessageWriter;
 
-absl::Status bad_answer(absl::string_view what) {
-  return absl::InternalError(absl::StrCat("its answer ", what));
-}
+absl::Status bad_answer(absl::string_view what) { return absl::InternalError(absl::StrCat("its answer ", what)); }
 
 unsigned wanted_outputs(Batch& batch) {
   unsigned outputs = 0;
@@ -31,8 +29,7 @@ unsigned wanted_outputs(Batch& batch) {
 std::size_t most_lanes(Batch& batch, bool sends_ids, unsigned outputs, const PieceLimits& limits) {
   std::size_t request = sends_ids ? sizeof(std::uint64_t) : 0, response = 0;
   for (const InputField& field : input_fields())
-    if (const auto& column = field.column(batch); column.present() && !column.one_value())
-      request += sizeof(float);
+    if (const auto& column = field.column(batch); column.present() && !column.one_value()) request += sizeof(float);
   for (const auto& place : wire::output_places())
     if (outputs & (1u << place.output)) response += sizeof(float);
   for (const auto& place : wire::byte_places())
@@ -79,8 +76,7 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
     v1::Generator& generator = *small.mutable_generator();
     generator.set_seed(batch.generator->seed);
     generator.set_dimension(batch.generator->dimension);
-    if (!batch.generator->id.present() && !sends_ids_)
-      generator.set_first_id(batch.generator->first_id + range.begin);
+    if (!batch.generator->id.present() && !sends_ids_) generator.set_first_id(batch.generator->first_id + range.begin);
   }
 
   const auto places = wire::input_places();
@@ -181,8 +177,7 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
           return true;
         });
         break;
-      default:
-        good = read_column(*field, field->number, 0);
+      default: good = read_column(*field, field->number, 0);
     }
   }
   if (!good || !reader.finished()) return bad_answer("is damaged");

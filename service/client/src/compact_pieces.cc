@@ -14,9 +14,7 @@ using wire::MessageReader;
 using wire::MessageWriter;
 using Response = v1::CompactResponse;
 
-absl::Status bad_answer(absl::string_view what) {
-  return absl::InternalError(absl::StrCat("its answer ", what));
-}
+absl::Status bad_answer(absl::string_view what) { return absl::InternalError(absl::StrCat("its answer ", what)); }
 
 std::size_t most_lanes(const Compaction& compaction, const PieceLimits& limits) {
   std::size_t request = 1, response = sizeof(std::uint32_t);
@@ -51,8 +49,7 @@ CompactPieces::CompactPieces(const Compaction& compaction, const PieceLimits& li
       first_(split_.pieces() + 1) {}
 
 Pieces CompactPieces::pieces() {
-  return {"/facetwise.v1.Sampler/Compact", split_.pieces(),
-          [this](std::size_t piece) { return encode(piece); },
+  return {"/facetwise.v1.Sampler/Compact", split_.pieces(), [this](std::size_t piece) { return encode(piece); },
           [this](std::size_t piece, grpc::ByteBuffer& response) { return decode(piece, response); }};
 }
 
@@ -68,14 +65,12 @@ grpc::ByteBuffer CompactPieces::encode(std::size_t piece) {
   writer.fields(small);
   char* status = writer.column(v1::CompactRequest::kStatusFieldNumber, status_bytes);
   gather(compaction_.status, positions_, range, status);
-  const std::size_t accepted =
-      std::count(status, status + status_bytes, static_cast<char>(LaneStatus::accepted));
+  const std::size_t accepted = std::count(status, status + status_bytes, static_cast<char>(LaneStatus::accepted));
   accepted_ += status_bytes == range.size() ? accepted : accepted * range.size();
   first_[piece + 1] = accepted_;
   for (const auto& column : compaction_.columns)
     gather(column.from, positions_, range,
-           writer.column(v1::CompactRequest::kColumnsFieldNumber,
-                         values_sent(column.from, range) * sizeof(float)));
+           writer.column(v1::CompactRequest::kColumnsFieldNumber, values_sent(column.from, range) * sizeof(float)));
   return std::move(writer).finish();
 }
 
@@ -91,9 +86,7 @@ absl::Status CompactPieces::decode(std::size_t piece, grpc::ByteBuffer& response
     if (!field) break;
     std::size_t bytes = 0;
     switch (field->number) {
-      case Response::kAcceptedFieldNumber:
-        good = reader.varint(*field, accepted);
-        break;
+      case Response::kAcceptedFieldNumber: good = reader.varint(*field, accepted); break;
       case Response::kIndexFieldNumber:
         has_index = true;
         if (!compaction_.index.present()) {
@@ -101,24 +94,21 @@ absl::Status CompactPieces::decode(std::size_t piece, grpc::ByteBuffer& response
           break;
         }
         good = reader.length(*field, bytes) && bytes == count * sizeof(std::uint32_t) &&
-               read_values(
-                   reader, compaction_.index, first, count, [&](std::uint32_t position, std::uint32_t& to) {
-                     to = static_cast<std::uint32_t>(
-                         positions_.lane(range.begin + std::min<std::size_t>(position, range.size() - 1)));
-                     return position < range.size();
-                   });
+               read_values(reader, compaction_.index, first, count, [&](std::uint32_t position, std::uint32_t& to) {
+                 to = static_cast<std::uint32_t>(
+                     positions_.lane(range.begin + std::min<std::size_t>(position, range.size() - 1)));
+                 return position < range.size();
+               });
         break;
       case Response::kColumnsFieldNumber:
-        good = columns < compaction_.columns.size() && reader.length(*field, bytes) &&
-               bytes == count * sizeof(float) &&
+        good = columns < compaction_.columns.size() && reader.length(*field, bytes) && bytes == count * sizeof(float) &&
                read_values(reader, compaction_.columns[columns].to, first, count, [](float value, float& to) {
                  to = value;
                  return true;
                });
         ++columns;
         break;
-      default:
-        good = reader.skip(*field);
+      default: good = reader.skip(*field);
     }
   }
   if (!good || !reader.finished()) return bad_answer("is damaged");

@@ -15,9 +15,7 @@ constexpr std::size_t kMostCompactColumns = 64;
 class RemoteEngine final : public Engine {
  public:
   RemoteEngine(std::vector<Connection> connections, const ConnectOptions& options, std::size_t message_bytes)
-      : connections_(std::move(connections)),
-        options_(options),
-        limits_{options.piece_bytes, message_bytes} {}
+      : connections_(std::move(connections)), options_(options), limits_{options.piece_bytes, message_bytes} {}
 
   absl::StatusOr<Statistics> run(Operation operation, const Batch& batch) override {
     if (auto status = check(operation, batch); !status.ok()) return status;
@@ -77,17 +75,14 @@ grpc::ChannelArguments channel_arguments(const std::string& address) {
 
 absl::Status check_address(const std::string& address) {
   const auto colon = address.rfind(':');
-  if (is_unix(address) ? address.size() > 5
-                       : colon != std::string::npos && colon > 0 && colon + 1 < address.size())
+  if (is_unix(address) ? address.size() > 5 : colon != std::string::npos && colon > 0 && colon + 1 < address.size())
     return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("address: \"", address, "\" is neither unix:PATH nor HOST:PORT"));
+  return absl::InvalidArgumentError(absl::StrCat("address: \"", address, "\" is neither unix:PATH nor HOST:PORT"));
 }
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> addresses,
-                                                const ConnectOptions& options) {
+absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> addresses, const ConnectOptions& options) {
   if (addresses.empty()) return absl::InvalidArgumentError("address: none given");
   if (options.piece_bytes == 0) return absl::InvalidArgumentError("piece_bytes: 0");
   if (options.window < 1) return absl::InvalidArgumentError("window: below 1");
@@ -97,8 +92,7 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
   wire::keep_grpc();
   std::vector<Connection> connections;
   for (const std::string& address : addresses) {
-    auto channel =
-        grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments(address));
+    auto channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), channel_arguments(address));
     channel->GetState(true);  // begins to connect: all at once
     connections.push_back({address, channel, std::make_unique<grpc::GenericStub>(channel)});
   }
@@ -117,8 +111,7 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
     message_bytes = std::min<std::size_t>(message_bytes, info.max_message_bytes());
   }
   if (message_bytes < 4096)
-    return absl::FailedPreconditionError(
-        absl::StrCat("a server takes messages of ", message_bytes, " bytes only"));
+    return absl::FailedPreconditionError(absl::StrCat("a server takes messages of ", message_bytes, " bytes only"));
   return std::make_unique<RemoteEngine>(std::move(connections), options, message_bytes);
 }
 

@@ -58,8 +58,7 @@ class Sender {
   absl::Status wait_for_connections() const {
     const auto until = std::chrono::system_clock::now() + options_.connect_timeout;
     for (const Connection& connection : connections_) {
-      if (connection.channel->GetState(true) == GRPC_CHANNEL_READY ||
-          connection.channel->WaitForConnected(until))
+      if (connection.channel->GetState(true) == GRPC_CHANNEL_READY || connection.channel->WaitForConnected(until))
         continue;
       return absl::UnavailableError(absl::StrCat("server ", connection.address, ": no connection within ",
                                                  options_.connect_timeout.count(), " ms: has it ended?"));
@@ -115,8 +114,7 @@ class Sender {
 
 }  // namespace
 
-absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options,
-                  const Pieces& pieces) {
+absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces) {
   return Sender(connections, options, pieces).run();
 }
 

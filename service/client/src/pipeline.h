@@ -30,7 +30,6 @@ struct Pieces {
 
 // Sends the pieces, at most options.window at a time, and takes the responses as they come. The first error
 // ends it: calls in flight are cancelled and waited for.
-absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options,
-                  const Pieces& pieces);
+absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces);
 
 }  // namespace facetwise

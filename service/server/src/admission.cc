@@ -13,8 +13,8 @@ absl::Status Admission::Ticket::hold(std::size_t bytes) {
   const std::lock_guard lock(admission_.mutex_);
   if (bytes > admission_.max_bytes_ - admission_.bytes_)
     return absl::ResourceExhaustedError(absl::StrCat("the server holds ", admission_.bytes_,
-                                                     " bytes of messages, its limit is ",
-                                                     admission_.max_bytes_, ": try again later"));
+                                                     " bytes of messages, its limit is ", admission_.max_bytes_,
+                                                     ": try again later"));
   admission_.bytes_ += bytes;
   bytes_ += bytes;
   return absl::OkStatus();

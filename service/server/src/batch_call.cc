@@ -48,8 +48,7 @@ class Decoder {
   absl::Status read_direction(int field, std::size_t bytes);
   absl::Status read_generator(std::size_t bytes);
   absl::Status read_outputs(const MessageReader::Field& field);
-  absl::Status read_column(absl::string_view name, std::size_t width, const MessageReader::Field& field,
-                           Bytes& column);
+  absl::Status read_column(absl::string_view name, std::size_t width, const MessageReader::Field& field, Bytes& column);
   absl::Status read_enum(const MessageReader::Field& field, int& value);
   absl::Status add_output(std::uint64_t value);
   // Calls read(field) for each field of the message, or of its next `bytes` bytes.
@@ -99,23 +98,17 @@ absl::Status Decoder::read() {
 absl::Status Decoder::read_field(const MessageReader::Field& field) {
   std::size_t bytes = 0;
   switch (field.number) {
-    case Request::kOperationFieldNumber:
-      return read_enum(field, operation_value_);
-    case Request::kSamplerFieldNumber:
-      return read_enum(field, sampler_);
-    case Request::kLanesFieldNumber:
-      return reader_.varint(field, lanes_) ? absl::OkStatus() : damaged_message();
-    case Request::kOutputsFieldNumber:
-      return read_outputs(field);
-    case Request::kModelFieldNumber:
-      return reader_.length(field, bytes) ? read_model(bytes) : damaged_message();
+    case Request::kOperationFieldNumber: return read_enum(field, operation_value_);
+    case Request::kSamplerFieldNumber: return read_enum(field, sampler_);
+    case Request::kLanesFieldNumber: return reader_.varint(field, lanes_) ? absl::OkStatus() : damaged_message();
+    case Request::kOutputsFieldNumber: return read_outputs(field);
+    case Request::kModelFieldNumber: return reader_.length(field, bytes) ? read_model(bytes) : damaged_message();
     case Request::kGeneratorFieldNumber:
       return reader_.length(field, bytes) ? read_generator(bytes) : damaged_message();
     case Request::kIncidentFieldNumber:
     case Request::kOutgoingFieldNumber:
       return reader_.length(field, bytes) ? read_direction(field.number, bytes) : damaged_message();
-    default:
-      break;
+    default: break;
   }
   const auto places = wire::input_places();
   for (std::size_t k = 0; k < places.size(); ++k)
@@ -134,28 +127,20 @@ absl::Status Decoder::read_enum(const MessageReader::Field& field, int& value) {
 absl::Status Decoder::read_model(std::size_t bytes) {
   return each_field_inside(bytes, [this](const MessageReader::Field& field) {
     switch (field.number) {
-      case v1::Model::kDistributionFieldNumber:
-        return read_enum(field, distribution_);
-      case v1::Model::kMaskingFieldNumber:
-        return read_enum(field, masking_);
-      case v1::Model::kShadowingFieldNumber:
-        return read_enum(field, shadowing_);
-      case v1::Model::kNormalisationFieldNumber:
-        return read_enum(field, normalisation_);
-      case v1::Model::kInterfaceFieldNumber:
-        return read_enum(field, interface_);
-      case v1::Model::kTransportFieldNumber:
-        return read_enum(field, transport_);
+      case v1::Model::kDistributionFieldNumber: return read_enum(field, distribution_);
+      case v1::Model::kMaskingFieldNumber: return read_enum(field, masking_);
+      case v1::Model::kShadowingFieldNumber: return read_enum(field, shadowing_);
+      case v1::Model::kNormalisationFieldNumber: return read_enum(field, normalisation_);
+      case v1::Model::kInterfaceFieldNumber: return read_enum(field, interface_);
+      case v1::Model::kTransportFieldNumber: return read_enum(field, transport_);
       case v1::Model::kRetroFieldNumber: {
         std::uint64_t value = 0;
         const bool good = reader_.varint(field, value);
         retro_ = value != 0;
         return good ? absl::OkStatus() : damaged_message();
       }
-      case v1::Model::kSlopeTableFieldNumber:
-        return read_slope_table(field);
-      default:
-        return reader_.skip(field) ? absl::OkStatus() : damaged_message();
+      case v1::Model::kSlopeTableFieldNumber: return read_slope_table(field);
+      default: return reader_.skip(field) ? absl::OkStatus() : damaged_message();
     }
   });
 }
@@ -183,20 +168,14 @@ absl::Status Decoder::read_generator(std::size_t bytes) {
     std::uint64_t value = 0;
     bool good = true;
     switch (field.number) {
-      case v1::Generator::kSeedFieldNumber:
-        good = reader_.eight_bytes(field, generator_.seed);
-        break;
-      case v1::Generator::kFirstIdFieldNumber:
-        good = reader_.varint(field, generator_.first_id);
-        break;
+      case v1::Generator::kSeedFieldNumber: good = reader_.eight_bytes(field, generator_.seed); break;
+      case v1::Generator::kFirstIdFieldNumber: good = reader_.varint(field, generator_.first_id); break;
       case v1::Generator::kDimensionFieldNumber:
         good = reader_.varint(field, value);
         generator_.dimension = static_cast<std::uint32_t>(value);
         break;
-      case v1::Generator::kIdFieldNumber:
-        return read_column("generator.id", 8, field, generator_id_);
-      default:
-        good = reader_.skip(field);
+      case v1::Generator::kIdFieldNumber: return read_column("generator.id", 8, field, generator_id_);
+      default: good = reader_.skip(field);
     }
     return good ? absl::OkStatus() : damaged_message();
   });
@@ -228,8 +207,8 @@ absl::Status Decoder::add_output(std::uint64_t value) {
   return absl::OkStatus();
 }
 
-absl::Status Decoder::read_column(absl::string_view name, std::size_t width,
-                                  const MessageReader::Field& field, Bytes& column) {
+absl::Status Decoder::read_column(absl::string_view name, std::size_t width, const MessageReader::Field& field,
+                                  Bytes& column) {
   std::size_t bytes = 0;
   if (!reader_.length(field, bytes)) return damaged_message();
   if (column.data != nullptr) return invalid_field(name, "given twice");
@@ -275,8 +254,8 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
   if (auto status = check_lanes(lanes_, limits); !status.ok()) return status;
   if (const unsigned strange = outputs_ & ~wire::outputs_of(*operation_); strange != 0) {
     const auto output = static_cast<v1::Output>(std::countr_zero(strange));
-    return invalid_field(
-        "outputs", absl::StrCat(view(name(*operation_)), " does not compute ", v1::Output_Name(output)));
+    return invalid_field("outputs",
+                         absl::StrCat(view(name(*operation_)), " does not compute ", v1::Output_Name(output)));
   }
 
   batch.lanes = lanes_;
@@ -356,14 +335,13 @@ absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const C
 
   const Response response(decoder.outputs(), decoder.lanes());
   if (response.bytes() > tools.limits.message_bytes)
-    return absl::ResourceExhaustedError(absl::StrCat("outputs: ", response.bytes(), " bytes for ",
-                                                     decoder.lanes(), " lanes are above the limit of ",
-                                                     tools.limits.message_bytes, ": send fewer lanes"));
+    return absl::ResourceExhaustedError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
+                                                     " lanes are above the limit of ", tools.limits.message_bytes,
+                                                     ": send fewer lanes"));
   if (auto status = tools.ticket.hold(response.bytes()); !status.ok()) return status;
   wire::MessageWriter writer = response.make(batch);
-  const auto statistics = tools.compute.run(tools.admission.calls(), [&](const Execution& execution) {
-    return run(decoder.operation(), batch, execution);
-  });
+  const auto statistics = tools.compute.run(
+      tools.admission.calls(), [&](const Execution& execution) { return run(decoder.operation(), batch, execution); });
   if (!statistics.ok()) return statistics.status();
 
   v1::Statistics counts;
@@ -383,8 +361,8 @@ absl::Status damaged_message() { return absl::InvalidArgumentError("message: tru
 
 absl::Status check_lanes(std::uint64_t lanes, const Limits& limits) {
   if (lanes <= limits.lanes()) return absl::OkStatus();
-  return absl::ResourceExhaustedError(absl::StrCat("lanes: ", lanes, " are above the limit of ",
-                                                   limits.lanes(), ": send them in several calls"));
+  return absl::ResourceExhaustedError(
+      absl::StrCat("lanes: ", lanes, " are above the limit of ", limits.lanes(), ": send them in several calls"));
 }
 
 }  // namespace facetwise

@@ -59,8 +59,7 @@ class Decoder {
         const std::size_t k = decoded.columns.size();
         if (!reader_.length(field, bytes)) return damaged_message();
         if (k == kMostCompactColumns)
-          return absl::ResourceExhaustedError(
-              absl::StrCat("columns: more than the limit of ", kMostCompactColumns));
+          return absl::ResourceExhaustedError(absl::StrCat("columns: more than the limit of ", kMostCompactColumns));
         if (bytes % 4 != 0)
           return invalid_field(absl::StrCat("columns[", k, "]"),
                                absl::StrCat(bytes, " bytes are not whole values of 4 bytes"));
@@ -69,8 +68,7 @@ class Decoder {
         decoded.columns.push_back({reinterpret_cast<const float*>(data), bytes / 4});
         return absl::OkStatus();
       }
-      default:
-        return reader_.skip(field) ? absl::OkStatus() : damaged_message();
+      default: return reader_.skip(field) ? absl::OkStatus() : damaged_message();
     }
   }
 
@@ -93,9 +91,8 @@ absl::Status check_request(const Decoded& decoded, const Limits& limits) {
   for (std::size_t k = 0; k < decoded.columns.size(); ++k) {
     const Column<float>& column = decoded.columns[k];
     if (column.count() != lanes && !column.one_value())
-      return invalid_field(
-          absl::StrCat("columns[", k, "]"),
-          absl::StrCat(column.count(), " values for ", lanes, lanes == 1 ? " lane" : " lanes"));
+      return invalid_field(absl::StrCat("columns[", k, "]"),
+                           absl::StrCat(column.count(), " values for ", lanes, lanes == 1 ? " lane" : " lanes"));
   }
   if (const std::size_t most = lanes * 4 * (1 + decoded.columns.size()); most > limits.message_bytes)
     return absl::ResourceExhaustedError(absl::StrCat("columns: ", most, " bytes for ", lanes,
@@ -129,8 +126,8 @@ absl::StatusOr<grpc::ByteBuffer> answer_compact(grpc::ByteBuffer& request, const
   for (std::size_t k = 1; k < columns; ++k)
     dense.push_back({decoded.columns[k - 1], {reinterpret_cast<float*>(values(k)), decoded.lanes}});
   compaction.columns = dense;
-  const auto accepted = tools.compute.run(
-      tools.admission.calls(), [&](const Execution& execution) { return compact(compaction, execution); });
+  const auto accepted = tools.compute.run(tools.admission.calls(),
+                                          [&](const Execution& execution) { return compact(compaction, execution); });
   if (!accepted.ok()) return accepted.status();
 
   v1::CompactResponse small;
@@ -138,8 +135,7 @@ absl::StatusOr<grpc::ByteBuffer> answer_compact(grpc::ByteBuffer& request, const
   wire::MessageWriter writer(columns, columns * *accepted * 4, 64, false);
   writer.fields(small);
   for (std::size_t k = 0; k < columns; ++k) {
-    const int field =
-        k == 0 ? v1::CompactResponse::kIndexFieldNumber : v1::CompactResponse::kColumnsFieldNumber;
+    const int field = k == 0 ? v1::CompactResponse::kIndexFieldNumber : v1::CompactResponse::kColumnsFieldNumber;
     std::memcpy(writer.column(field, *accepted * 4), values(k), *accepted * 4);
   }
   return std::move(writer).finish();

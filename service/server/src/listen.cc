@@ -38,14 +38,13 @@ absl::Status check_address(const std::string& address) {
     const std::string path = unix_path(address);
     constexpr std::size_t kLongest = sizeof(sockaddr_un::sun_path) - 1;
     if (path.empty()) return invalid("has no path: write unix:PATH");
-    if (path.size() > kLongest)
-      return invalid(absl::StrCat("is too long a path: ", kLongest, " bytes at most"));
+    if (path.size() > kLongest) return invalid(absl::StrCat("is too long a path: ", kLongest, " bytes at most"));
     return absl::OkStatus();
   }
   const auto colon = address.rfind(':');
   int port = -1;
-  if (colon == std::string::npos || colon == 0 || !absl::SimpleAtoi(address.substr(colon + 1), &port) ||
-      port < 0 || port > 65535)
+  if (colon == std::string::npos || colon == 0 || !absl::SimpleAtoi(address.substr(colon + 1), &port) || port < 0 ||
+      port > 65535)
     return invalid("is neither unix:PATH nor HOST:PORT");
   return absl::OkStatus();
 }
@@ -77,10 +76,10 @@ absl::StatusOr<SocketLock> SocketLock::take(const std::string& path) {
     const int file = open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
     if (file < 0) return system_error(path, "cannot make its lock file");
     if (flock(file, LOCK_EX | LOCK_NB) != 0) {
-      const absl::Status status =
-          errno == EWOULDBLOCK ? absl::UnavailableError(absl::StrCat(
-                                     "unix:", path, ": another server listens there (it holds ", name, ")"))
-                               : system_error(path, "cannot lock its lock file");
+      const absl::Status status = errno == EWOULDBLOCK
+                                      ? absl::UnavailableError(absl::StrCat(
+                                            "unix:", path, ": another server listens there (it holds ", name, ")"))
+                                      : system_error(path, "cannot lock its lock file");
       close(file);
       return status;
     }
@@ -99,8 +98,7 @@ absl::StatusOr<SocketLock> SocketLock::take(const std::string& path) {
       // Not ours to remove, so the lock goes without it.
       unlink(name.c_str());
       close(std::exchange(lock.file_, -1));
-      return absl::UnavailableError(
-          absl::StrCat("unix:", path, ": there is a file of that name that is no socket"));
+      return absl::UnavailableError(absl::StrCat("unix:", path, ": there is a file of that name that is no socket"));
     }
     unlink(path.c_str());
   }

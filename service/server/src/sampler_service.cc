@@ -25,12 +25,12 @@ SamplerService::SamplerService(const ServerOptions& options)
   add("/facetwise.v1.Sampler/RunStream", answer_batch, Messages::many);
   add("/facetwise.v1.Sampler/Compact", answer_compact, Messages::one);
   add("/facetwise.v1.Sampler/CompactStream", answer_compact, Messages::many);
-  AddMethod(new RpcServiceMethod(
-      "/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
-      new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
-          [](SamplerService* service, grpc::ServerContext*, const v1::InfoRequest*,
-             v1::InfoResponse* response) { return service->info(*response); },
-          this)));
+  AddMethod(
+      new RpcServiceMethod("/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
+                           new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
+                               [](SamplerService* service, grpc::ServerContext*, const v1::InfoRequest*,
+                                  v1::InfoResponse* response) { return service->info(*response); },
+                               this)));
   AddMethod(new RpcServiceMethod(
       "/facetwise.v1.Sampler/Benchmark", RpcMethod::SERVER_STREAMING,
       new grpc::internal::ServerStreamingHandler<SamplerService, v1::BenchmarkRequest, v1::BenchmarkProgress>(
@@ -42,14 +42,14 @@ SamplerService::SamplerService(const ServerOptions& options)
 }
 
 void SamplerService::add(const char* name, Answer answer, Messages messages) {
-  AddMethod(new RpcServiceMethod(
-      name, RpcMethod::BIDI_STREAMING,
-      new grpc::internal::BidiStreamingHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
-          [=](SamplerService* service, grpc::ServerContext* context, Stream* stream) {
-            return messages == Messages::one ? service->answer_one(answer, *context, *stream)
-                                             : service->answer_many(answer, *context, *stream);
-          },
-          this)));
+  AddMethod(
+      new RpcServiceMethod(name, RpcMethod::BIDI_STREAMING,
+                           new grpc::internal::BidiStreamingHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
+                               [=](SamplerService* service, grpc::ServerContext* context, Stream* stream) {
+                                 return messages == Messages::one ? service->answer_one(answer, *context, *stream)
+                                                                  : service->answer_many(answer, *context, *stream);
+                               },
+                               this)));
 }
 
 grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& context, Stream& stream) {
@@ -94,14 +94,12 @@ grpc::Status SamplerService::benchmark(grpc::ServerContext& context, const v1::B
                                        grpc::ServerWriter<v1::BenchmarkProgress>& writer) {
   constexpr std::size_t kLongestFilter = 1000;
   if (!options_.allow_benchmark || !options_.benchmark)
-    return error(grpc::StatusCode::PERMISSION_DENIED,
-                 "benchmarks are off: start the server with --allow-benchmark");
+    return error(grpc::StatusCode::PERMISSION_DENIED, "benchmarks are off: start the server with --allow-benchmark");
   if (request.filter().size() > kLongestFilter)
     return error(grpc::StatusCode::INVALID_ARGUMENT,
                  absl::StrCat("filter: ", request.filter().size(), " bytes, at most ", kLongestFilter));
   if (const double s = request.min_seconds(); s != 0 && !(s > 0 && s <= 10))
-    return error(grpc::StatusCode::INVALID_ARGUMENT,
-                 absl::StrCat("min_seconds: ", s, " is not in (0, 10], nor 0"));
+    return error(grpc::StatusCode::INVALID_ARGUMENT, absl::StrCat("min_seconds: ", s, " is not in (0, 10], nor 0"));
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
   if (benchmark_runs_.exchange(true))

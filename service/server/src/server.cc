@@ -102,15 +102,14 @@ absl::Status GrpcServer::listen() {
   for (std::size_t k = 0; k < ports.size(); ++k) {
     const std::string& address = options_.listen[k];
     if (ports[k] <= 0)
-      return absl::UnavailableError(absl::StrCat(
-          address, ": cannot listen there: in use, not allowed, or not an address of this machine"));
+      return absl::UnavailableError(
+          absl::StrCat(address, ": cannot listen there: in use, not allowed, or not an address of this machine"));
   }
   for (std::size_t k = 0; k < ports.size(); ++k) {
     const std::string& address = options_.listen[k];
     const std::string path = unix_path(address);
     if (!path.empty() && chmod(path.c_str(), options_.unix_mode) != 0)
-      return absl::UnavailableError(
-          absl::StrCat(address, ": cannot set its permissions: ", std::strerror(errno)));
+      return absl::UnavailableError(absl::StrCat(address, ": cannot set its permissions: ", std::strerror(errno)));
     addresses_.push_back(path.empty() ? with_port(address, ports[k]) : address);
   }
   if (!server_) return absl::UnavailableError("listen: the server could not start");
