@@ -5,12 +5,13 @@ cd "$(dirname "$0")"
 
 usage() {
   cat <<'EOF'
-Usage: ./test.sh [--long] [--help]
+Usage: ./test.sh [--quick | --long] [--help]
 
 On a Debian 12 machine: installs the packages that are missing, builds the presets `test` (everything,
 build/release) and `arm64` (the library, build/arm64), and runs all tests in one CTest run; those built
 for arm64 run under qemu-aarch64 and are named arm64.*.
 
+  --quick  the native tests alone: nothing is built for arm64 or emulated
   --long   also the tests that take long: the power of the chi-square test at 10^8 samples, and the like
 
 Exit code: 0 if every test passed. CTest's own report is the end of the output.
@@ -18,8 +19,10 @@ EOF
 }
 
 long=
+quick=
 for argument in "$@"; do
   case "$argument" in
+    --quick) quick=1 ;;
     --long) long=1 ;;
     -h | --help) usage; exit 0 ;;
     *) echo "test.sh: unknown argument \"$argument\"" >&2; usage >&2; exit 2 ;;
@@ -40,12 +43,16 @@ logged() {
 
 echo "packages"
 logged install-test cmake/install.sh test
-# arm64 first: the native build includes its tests.
-echo "build for arm64 (build/arm64)"
-logged configure-arm64 cmake --preset arm64
-logged build-arm64 cmake --build build/arm64
+emulated=
+if [ -z "$quick" ]; then
+  # arm64 first: the native build includes its tests.
+  emulated=$PWD/build/arm64
+  echo "build for arm64 (build/arm64)"
+  logged configure-arm64 cmake --preset arm64
+  logged build-arm64 cmake --build build/arm64
+fi
 echo "build (build/release)"
-logged configure-test cmake --preset test -D FACETWISE_TESTS_FROM="$PWD/build/arm64"
+logged configure-test cmake --preset test -D FACETWISE_TESTS_FROM="$emulated"
 logged build-test cmake --build build/release
 
 export FACETWISE_LONG=$long

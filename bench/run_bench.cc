@@ -14,7 +14,7 @@
 #include "case.h"
 #include "columns.h"
 #include "facetwise/bench.h"
-#include "limits.h"
+#include "machine_limits.h"
 #include "machine.h"
 #include "rejection.h"
 #include "targets.h"

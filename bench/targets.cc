@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "limits.h"
+#include "machine_limits.h"
 #include "paired.h"
 #include "runner.h"
 

@@ -10,7 +10,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "limits.h"
+#include "machine_limits.h"
 #include "runner.h"
 
 namespace facetwise::bench {

@@ -85,8 +85,8 @@ const std::vector<Family>& families() {
 }
 
 bool sees_behind(const Model& model) {
-  return model.masking == Masking::smith || model.distribution == Distribution::ggx ||
-         model.distribution == Distribution::beckmann;
+  return model.masking == Masking::smith ||
+         (model.distribution != Distribution::phong && model.distribution != Distribution::table);
 }
 
 Composition plain(const Family& family, Sampler sampler) {

@@ -38,7 +38,7 @@ std::vector<Sampler> samplers_of(const Family& family, Operation operation);
 // Every shadowing, normalisation, interface and retro of a family (retro: see Points), each with every
 // sampler.
 std::vector<Composition> compositions(const Family& family, Operation operation);
-// Whether the model shows anything to an i behind the surface: V-cavity with ggx and beckmann, and Smith.
+// Whether the model shows anything to an i behind the surface: V-cavity but with phong and tables, and Smith.
 bool sees_behind(const Model& model);
 // The family's conductor, unbiased.
 Composition plain(const Family& family, Sampler sampler);

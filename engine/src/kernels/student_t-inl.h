@@ -18,6 +18,7 @@ namespace HWY_NAMESPACE {
 
 struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   static constexpr bool kLongChains = true;
+  static constexpr bool kCavityBehind = true;
 
   // nu + z, and nu itself, for w stretched by sqrt(2) more; behind by its conjugate.
   template <class D, class V = Vec<D>>
@@ -132,7 +133,77 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     y = root2 * (half * (t + one / t)) * Conditional(d, u2);
   }
 
+  // V-cavity behind. With k = |i_z| / sqrt(A), n(k)^2 = 2 + k^2 and sigma(-i) / sqrt(A) = 1 / D(k), D(k) = n (n + k)^2,
+  // H = (1 / D(k) - 1 / D(3 k)) / k. By D = 2 n (1 + k^2) + 2 k (2 + k^2) the difference D(3 k) - D(k) is k times a sum
+  // of positive terms.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_NOINLINE void TwoHit(D d, const I& i, V& two_hit, V&) {
+    const Behind<D> at(d, i);
+    const V difference = Fma(Set(d, 16.0f) * at.k, at.n3 + Fma(at.k, at.k, Set(d, 1.0f)) / (at.n1 + at.n3),
+                             Fma(Set(d, 52.0f), at.k * at.k, Set(d, 8.0f)));
+    const V hit = difference / at.d3 / at.d1;
+    two_hit = hit + hit;
+  }
+  // Tokuyoshi 2021, listings 1 and 4: the first part are slopes below -3 k, the second visible ones from -3 k to -k.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_NOINLINE void DrawBehindCavity(D d, const I& i, V u1, V u2, V& u3, V& x, V& y, V& im) {
+    const V one = Set(d, 1.0f), two = Set(d, 2.0f), three = Set(d, 3.0f), four = Set(d, 4.0f);
+    const Behind<D> at(d, i);
+    // The share of slopes below -3 k is q^2 (3 - q) / 4, q = 1 - 3 k / n(3 k).
+    const V q3 = two / (at.n3 * (at.n3 + three * at.k));
+    const V beyond = q3 * q3 * (three - q3) * Set(d, 0.25f);
+    const V probability = Min(four * beyond / i.two_sigma, one);
+    const auto first = u3 < probability;
+    const V share = Select(first, probability, one - probability);
+    u3 = Min(Select(first, u3, u3 - probability) / Max(share, Set(d, kTiny)), Set(d, kLargestBelowOne));
+
+    // First: q for the share u1 of those below -3 k, by Newton's method. In units of q3, which may be tiny:
+    // z^2 (3 - q3 z) = u1 (3 - q3).
+    const V low = Max(u1, Set(d, 0x1p-26f));
+    const V right = low * (three - q3);
+    V z = Sqrt(right / (three - q3 * Sqrt(low)));
+    for (int step = 0; step < 2; ++step) {
+      const V f = Fma(z * z, NegFma(q3, z, three), Neg(right));
+      z = z - f / (three * z * NegFma(q3, z, two));
+    }
+    const V q = q3 * Min(z, one);
+    // x = -sqrt(2) s / sqrt(1 - s^2), s = 1 - q
+    const V root2 = Set(d, 1.41421356f);
+    const V wide = one / Sqrt(q * (two - q));  // sqrt(1 + x^2 / 2)
+    const V first_x = Neg(Max(root2 * (one - q) * wide, three * at.k));
+    const V first_y = root2 * wide * Conditional(d, u2);
+    // Second: of all visible slopes those above -3 k: shares above that at -3 k, D(k) (1 / D(3 k) + 2 k beyond).
+    const V at3 = at.d1 * Fma(two * at.k, beyond, one / at.d3);
+    const V u = Min(Fma(u1, one - at3, at3), Set(d, kLargestBelowOne));
+    const V inverse_nu = one / i.nu;
+    V second_x, second_y, gap;
+    DrawVisible(d, i, i.wz * inverse_nu, at.root * inverse_nu, u, u2, second_x, second_y, gap);
+    const V second_im = Min(i.nu * gap, two * Abs(i.z));
+
+    Azimuth<D>(d, i.wx, i.wy, at.root, i.a < Set(d, kSmallestA))
+        .Turn(Select(first, first_x, second_x), Select(first, first_y, second_y), x, y);
+    im = Select(first, at.root * Neg(first_x + at.k), second_im);
+  }
+
  private:
+  // k, n and D at k and 3 k; sqrt(A).
+  template <class D>
+  struct Behind {
+    using V = Vec<D>;
+    V root, k, n1, n3, d1, d3;
+    template <class I>
+    HWY_INLINE Behind(D d, const I& i) {
+      const V two = Set(d, 2.0f);
+      root = Sqrt(Max(i.a, Set(d, kSmallestA)));
+      k = Abs(i.z) / root;
+      const V k3 = Set(d, 3.0f) * k;
+      n1 = Sqrt(Fma(k, k, two));
+      n3 = Sqrt(Fma(k3, k3, two));
+      const V sum1 = n1 + k, sum3 = n3 + k3;
+      d1 = n1 * sum1 * sum1;
+      d3 = n3 * sum3 * sum3;
+    }
+  };
   // The y with density 8 / (3 pi (1 + y^2)^3) and share u below. Both tails fall with y^-5: y is (1 - u)^(-1/5) -
   // u^(-1/5) times a smooth function of (4 u (1 - u))^(1/5), fitted by a polynomial. Error of the share 2e-7.
   template <class D, class V = Vec<D>>

@@ -11,7 +11,8 @@ namespace facetwise::reference {
 
 bool sees_nothing(const Surface& surface, Vector i) {
   const Distribution d = surface.model.distribution;
-  return surface.model.masking == Masking::vcavity && i.z <= 0 && d != Distribution::ggx && d != Distribution::beckmann;
+  return surface.model.masking == Masking::vcavity && i.z <= 0 &&
+         (d == Distribution::phong || d == Distribution::table);
 }
 
 double masking(const Surface& surface, Vector i) {

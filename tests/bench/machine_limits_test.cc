@@ -1,5 +1,5 @@
 // The machine's limits are measured: they do the work they say, and take the time it takes.
-#include "bench/limits.h"
+#include "bench/machine_limits.h"
 
 #include <gtest/gtest.h>
 

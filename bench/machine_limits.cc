@@ -1,4 +1,4 @@
-#include "limits.h"
+#include "machine_limits.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

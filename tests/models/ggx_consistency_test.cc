@@ -3,7 +3,7 @@
 // Moving o by d moves log p by at most about d times
 //   4 / |h| + 4 |S h| / (h.S h),  h = i + o,  S = diag(1 / alpha_x^2, 1 / alpha_y^2, 1),
 // for `ndf` also d (1 / h_z + 2 / |h|). Samplers that form a half vector in the stretched frame know i.m, and
-// with it their pdf, to 4 / |i_hat + o_hat|^2 units (accuracy_test.cc). The kernels' o is within a few units
+// with it their pdf, to 4 / |i_hat + o_hat|^2 units (ggx_accuracy_test.cc). The kernels' o is within a few units
 // of 2^-24 of the sample that the pdf was computed for, so that the two agree to that many units times this,
 // and no implementation can promise more. At alpha = 1e-4, i_z = 1e-3 that is per cents. The weight has no
 // such loss: its density is cancelled.
