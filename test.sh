@@ -11,7 +11,7 @@ On a Debian 12 machine: installs the packages that are missing, builds the prese
 build/release) and `arm64` (the library, build/arm64), and runs all tests in one CTest run; those built
 for arm64 run under qemu-aarch64 and are named arm64.*.
 
-  --quick  the native tests alone: nothing is built for arm64 or emulated
+  --quick  only the native tests: nothing is built for arm64 or emulated
   --long   also the tests that take long: the power of the chi-square test at 10^8 samples, and the like
 
 Exit code: 0 if every test passed. CTest's own report is the end of the output.

@@ -38,7 +38,7 @@ void ModelArguments::add(CLI::App& app) {
          },
          "Distribution of normals; default ggx. A table is a file of slopes' densities")
       ->type_name(kDistributions);
-  add_named(app, "--masking", model.masking, parse_masking, "Masking function; default smith; phong has vcavity alone",
+  add_named(app, "--masking", model.masking, parse_masking, "Masking function; default smith; phong has only vcavity",
             "smith|vcavity");
   add_named(app, "--shadowing", model.shadowing, parse_shadowing,
             "Masking-shadowing of weights and values; default correlated", "correlated|uncorrelated");

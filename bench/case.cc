@@ -27,7 +27,7 @@ constexpr Sampler kMemorySamplers[] = {Sampler::cap, Sampler::exact};
 constexpr Sampler kGgxSamplers[] = {Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact};
 
 bool has_baseline(const Case& which) {
-  if (which.inputs == Inputs::generator) return false;  // it takes its random numbers from columns alone
+  if (which.inputs == Inputs::generator) return false;  // it takes its random numbers only from columns
   if (which.scatters()) return false;
   const baseline::Model model{which.distribution, which.masking};
   if (which.sampler) return baseline::has_baseline(model, *which.sampler);

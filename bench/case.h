@@ -53,7 +53,7 @@ struct Case {
   // Float columns with a value per lane that are read, and that are written.
   int input_columns() const;
   int output_columns() const;
-  // True if `other` differs in the implementation alone, so that their times make a ratio.
+  // True if `other` differs only in the implementation, so that their times make a ratio.
   bool comparable(const Case& other) const;
 };
 

@@ -10,7 +10,7 @@ namespace facetwise::bench {
 
 inline constexpr int kCopyOrders = 3;
 enum class CopyOrder {
-  one_by_one,    // column after column: memcpy, and a sum over those that are read alone
+  one_by_one,    // column after column: memcpy, and a sum over those that are only read
   side_by_side,  // a vector of each column at a time, as the kernels do
   streaming,     // likewise, with stores past the caches: quicker beyond them, slower inside
 };

@@ -12,7 +12,7 @@ namespace facetwise::bench {
 // Runs the case's batch once and returns how many lanes were occluded.
 using Runner = std::function<absl::StatusOr<std::uint64_t>()>;
 
-// `columns` has the case's roughness set and outlives the runner. `remote` is for remote cases alone.
+// `columns` has the case's roughness set and outlives the runner. Only remote cases need `remote`.
 Runner make_runner(const Case& which, const Columns& columns, Target target, Engine* remote);
 
 // Whether this build and CPU have the baseline's loops vectorised by the compiler for a target.

@@ -12,7 +12,7 @@ namespace {
 
 using Out = std::back_insert_iterator<std::string>;
 
-// Results that differ in the implementation alone.
+// Results that differ only in the implementation.
 struct Row {
   const BenchResult* any = nullptr;
   const BenchResult *scalar = nullptr, *vectorised = nullptr, *one_lane = nullptr, *simd = nullptr, *threads = nullptr,

@@ -36,7 +36,7 @@ inline float masking(Vector i, float alpha_x, float alpha_y);
 
 // Of any of these models (has_baseline()): GGX with Smith masking as above; Beckmann with Smith by `ndf` and `visible`
 // (slope inversion by Newton's method: Heitz & d'Eon 2014, Jakob 2014); Student-t with Smith by `ndf`; V-cavity with
-// these three, by `ndf` and `visible` (flipping: Heitz & d'Eon 2014), for i_z > 0 alone.
+// these three, by `ndf` and `visible` (flipping: Heitz & d'Eon 2014), only for i_z > 0.
 struct Model {
   Distribution distribution = Distribution::ggx;
   Masking masking = Masking::smith;

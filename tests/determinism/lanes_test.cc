@@ -1,4 +1,4 @@
-// A lane's results depend on its inputs alone: any length on every target, any order, outputs over any
+// A lane's results depend only on its inputs: any length on every target, any order, outputs over any
 // inputs.
 #include "determinism/compare.h"
 #include "support/counts.h"

@@ -135,7 +135,7 @@ TEST_F(CacheLines, EveryColumnAtItsOwnOffset) {
     for (int round = 0; round < (kQuick ? 1 : 6); ++round) {
       ++seed;
       const auto any = [&](std::size_t n) { return static_cast<std::size_t>(hash(seed, n) % kLine); };
-      // Most at one offset, some elsewhere: those alone are streamed.
+      // Most at one offset, some elsewhere: only those are streamed.
       const auto few_differ = [&](std::size_t n) { return n % 5 == 3 ? any(n) : any(0); };
       for (const Target target : available_targets()) {
         const Execution execution = {.target = target, .stores = Stores::streaming};

@@ -76,7 +76,7 @@ TEST_P(ModelComposition, SamplersForIsWhatRunTakes) {
   EXPECT_TRUE(samplers_for(Operation::masking, plain(GetParam(), Sampler::visible).model).empty());
 }
 
-// Every family has `ndf` and `visible`, for normals and reflections; samplers of reflections alone draw no
+// Every family has `ndf` and `visible`, for normals and reflections; samplers of only reflections draw no
 // normals.
 TEST_P(ModelComposition, NdfAndVisibleAlwaysFit) {
   for (const Operation operation :

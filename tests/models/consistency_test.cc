@@ -68,7 +68,7 @@ TEST_P(ModelConsistency, SamplesAgreeWithQueries) {
       if (student_t_straight_up(c, points[n])) continue;
       ++drawn;
       const Vector i = incident(points[n]), from = c.model.retro ? turned(i) : i, o = outgoing(points[n]);
-      // The rim of what microfacets reach, and half vectors of rounding alone.
+      // The rim of what microfacets reach, and half vectors that are nothing but rounding.
       if (from.z + o.z <= 4 * kUnit || o.z <= 4 * kUnit) continue;
       if (std::hypot(from.x + o.x, from.y + o.y, from.z + o.z) < 1e-3) continue;
       if (sample.pdf < 1e-15 || sample.pdf > 1e30) continue;

@@ -1,4 +1,4 @@
-// Quadrature over standard slopes, which knows the definitions alone: slopes, normals, where they face i and
+// Quadrature over standard slopes, which knows only the definitions: slopes, normals, where they face i and
 // where their reflections are not occluded. Shares nothing with the reference's own quadrature.
 #pragma once
 

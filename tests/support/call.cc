@@ -236,7 +236,7 @@ Lanes adversarial_lanes(std::size_t count, std::uint64_t seed) {
     float& value = lanes.in[input::kPlain[(bits >> 8) % kPlain]][lane];
     value = (bits >> 16) % 4 == 0 ? std::bit_cast<float>(static_cast<std::uint32_t>(bits >> 32))
                                   : kBad[(bits >> 24) % std::size(kBad)];
-    // Columns of some models alone.
+    // Columns of only some models.
     const std::uint64_t more = hash(seed + 2000, lane);
     float& other = lanes.in[input::mean_slope_x + more % kOthers][lane];
     other = (more >> 16) % 4 == 0 ? std::bit_cast<float>(static_cast<std::uint32_t>(more >> 32))

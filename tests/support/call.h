@@ -1,4 +1,4 @@
-// Calls of the engine for tests that treat all operations alike: inputs made by integer hashing alone, so that
+// Calls of the engine for tests that treat all operations alike: inputs made only by integer hashing, so that
 // every machine has the same, and outputs to compare bit by bit.
 #pragma once
 

@@ -17,7 +17,7 @@ struct Configuration {
 reference::Vector incident(const Configuration& configuration);
 reference::Roughness roughness(const Configuration& configuration);
 
-// Unique, made of letters, digits and _ alone: "theta_60_azimuth_0_alpha_0p3_1".
+// Unique, made only of letters, digits and _: "theta_60_azimuth_0_alpha_0p3_1".
 std::string name(const Configuration& configuration);
 
 // At least 60: front, back to theta = 170, 89.9 and 90.5, normal incidence, alpha from 1e-3 to 4 on both

@@ -133,7 +133,7 @@ void ordinary_lane(Sequence& next, const Block& block, float (&lane)[kFields]) {
   std::copy(std::begin(values), std::end(values), lane);
 }
 
-// The columns of some models alone.
+// The columns of only some models.
 void other_columns(Sequence& next, Kind kind, bool exceptions, Lanes& lanes, std::size_t lane) {
   static constexpr float kBad[] = {kNan, kInfinity, -kInfinity, 3e38f, -1.0f, 1.0f, 100.01f, -100.01f, 0.00999f};
   const auto put = [&](input::Index index, float value) {

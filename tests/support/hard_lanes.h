@@ -1,6 +1,6 @@
 // More lanes that look for trouble, in blocks of unlike kinds: made, as those of call.h are, of integer
 // hashes and of
-// + - * / and square roots alone, so that every machine has the same bits.
+// only + - * / and square roots, so that every machine has the same bits.
 #pragma once
 
 #include <cstddef>

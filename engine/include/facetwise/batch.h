@@ -30,7 +30,7 @@ namespace facetwise {
 // Batch::sampler where the pdf is wanted, masking never.
 //
 // With a dielectric, *_reflection and *_transmission force the event: each microfacet reflects, or transmits,
-// whatever its Fresnel reflectance F, which is then part of weight and value alone. *_scattering choose between
+// whatever its Fresnel reflectance F, which is then part of weight and value only. *_scattering choose between
 // the two by u3, in proportion to F v_R and (1 - F) v_T where v_R, v_T say whether the direction would be
 // accepted; the pdf has that probability as a factor. evaluate_scattering answers for both sides: o_z > 0 is
 // reflection, o_z < 0 transmission.
@@ -160,7 +160,7 @@ std::span<const ByteField> byte_fields();
 // Whether a call reads a field, if only where it is given (`otherwise`): those of the model's interface, u3 where the
 // sampler or the choice of an event needs it. A generator stands in for u1, u2 and u3.
 bool reads(Operation, const Model&, Sampler, const InputField&);
-// Whether an operation computes a field for a model: share_unoccluded is known for GGX with Smith alone, and
+// Whether an operation computes a field for a model: share_unoccluded is known only for GGX with Smith, and
 // V-cavity's masking depends on m.
 bool computes(Operation, const Model&, const OutputField&);
 bool computes(Operation, const ByteField&);

@@ -73,7 +73,7 @@ enum class Transport : std::uint8_t { radiance = 0, importance = 1 };
 //   exact    reflections by the visible normals whose reflection is not occluded: for GGX in exact proportion, for
 //            Beckmann and for V-cavity nearly so. facetwise's own, docs/math.md. Uses u3 too.
 //
-// `bounded` and `exact` are for reflections alone; for i_z <= 0 both are `visible`.
+// `bounded` and `exact` are for reflections only; for i_z <= 0 both are `visible`.
 enum class Sampler : std::uint8_t { ndf = 0, heitz = 1, cap = 2, bounded = 3, exact = 4, visible = 5 };
 
 struct Model {

@@ -24,7 +24,7 @@ namespace facetwise {
 using SlopeDensity = std::function<double(double x, double y)>;
 
 // What kernels read. Rows of azimuth: azimuths + 1, the last a copy of the first; one if radial. Areas have
-// kAreaTurns as many steps of azimuth: they are small and shall be exact.
+// kAreaTurns as many steps of azimuth: they are small, and must be exact.
 struct SlopeTableView {
   static constexpr std::int32_t kAreaTurns = 4;
 
@@ -43,7 +43,7 @@ class SlopeTable {
  public:
   // Sizes; 0 is the default, of which the first is for radial tables.
   struct Options {
-    bool radial = false;        // P22 depends on x^2 + y^2 alone
+    bool radial = false;        // P22 depends only on x^2 + y^2
     std::size_t grid = 0;       // nodes of the density, per axis: 1025, 513
     std::size_t incidence = 0;  // nodes in theta: 129, 65
     std::size_t slopes = 0;     // nodes in tilt: 129, 129
@@ -54,7 +54,7 @@ class SlopeTable {
     std::function<void(double)> progress{};
   };
 
-  // Calls p22 on this thread alone, at the grid's nodes; it may throw. The same machine makes the same bits
+  // Calls p22 only on this thread, at the grid's nodes; it may throw. The same machine makes the same bits
   // with any threads; another's sine may differ in the last place: to have one table, share its file.
   static absl::StatusOr<std::shared_ptr<const SlopeTable>> build(const SlopeDensity& p22, const Options& options);
 

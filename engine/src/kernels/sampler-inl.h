@@ -90,7 +90,7 @@ struct SamplerTraits {
   static constexpr bool kShifted = true;    // N is times exp(shift), as sigma is (surface-inl.h)
   static constexpr bool kOwnShift = false;  // N is times e^(shift) of the sample's own
   static constexpr bool kExact = false;     // for i_z > 0 no reflection is occluded; o_z is raised to kRim
-  static constexpr bool kNormals = true;    // serves normals and transmission too, not reflections alone
+  static constexpr bool kNormals = true;    // serves normals and transmission too, not only reflections
 };
 
 // What samplers of all visible normals share: N = sigma(i).

@@ -80,7 +80,7 @@ double pdf_reflection(const Surface& surface, Sampler sampler, Vector i, Vector 
   i = turned(surface, i);
   const Vector h = i + o;
   if (o.z <= 0 || h.z <= 0) return 0;
-  // i.m is |h| / 2: the scalar product would be rounding alone where o is nearly -i.
+  // i.m is |h| / 2: the scalar product would be nothing but rounding where o is nearly -i.
   const Real im = length(h) / 2;
   return static_cast<double>(sampled_density(surface, sampler, i, normalize(h), im) / (4 * im));
 }

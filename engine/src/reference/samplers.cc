@@ -101,7 +101,7 @@ double pdf_reflection(Sampler sampler, Roughness alpha, Vector i, Vector o) {
   const Vector h = i + o;
   if (o.z <= 0 || h.z <= 0) return 0;
   const Vector m = normalize(h);
-  // i.m is |h| / 2 for unit vectors; dot(i, m) would be rounding alone where o is nearly -i.
+  // i.m is |h| / 2 for unit vectors; dot(i, m) would be nothing but rounding where o is nearly -i.
   return distribution(alpha, m) / (4 * normaliser(sampler, alpha, i, m, length(h) / 2));
 }
 

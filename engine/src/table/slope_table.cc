@@ -95,7 +95,7 @@ double SlopeTable::p22(double x, double y) const {
 }
 
 double SlopeTable::projected_area(double theta, double phi) const {
-  // Midpoints in chi and psi, over the visible tilts alone.
+  // Midpoints in chi and psi, over the visible tilts only.
   constexpr int kTilts = 1000, kSides = 1000;
   const double from = -pi / 2, width = pi - theta, c = std::cos(phi), s = std::sin(phi);
   double cos_psi[kSides], sin_psi[kSides];

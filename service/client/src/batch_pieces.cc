@@ -131,7 +131,7 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
   for (std::size_t k = 0; k < byte_places.size(); ++k)
     if (byte_fields()[k].column(batch_).present()) missing |= 1u << (places.size() + k);
 
-  // Reads a column, or passes over one that was not asked for (y of a direction whose x alone was).
+  // Reads a column, or passes over one that was not asked for (y of a direction of which only x was).
   const auto read_column = [&](const MessageReader::Field& field, int number, int part) {
     for (std::size_t k = 0; k < places.size(); ++k) {
       if (places[k].field != number || places[k].part != part) continue;
