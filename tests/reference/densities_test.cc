@@ -77,8 +77,7 @@ bool has_exact(const Surface& s) {
 }
 
 bool sees_nothing(const Surface& s, Vector i) {
-  return s.model.masking == Masking::vcavity && i.z <= 0 && s.model.distribution != Distribution::ggx &&
-         s.model.distribution != Distribution::beckmann;
+  return s.model.masking == Masking::vcavity && i.z <= 0 && s.model.distribution == Distribution::phong;
 }
 
 Vector reflection(Vector i, Vector m, double im) {
