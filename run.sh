@@ -77,7 +77,7 @@ done
 say "verify: batches of traced rays against the server"
 rm -f out/verify.json out/report.json
 logged verify "$facetwise" verify --remote "$address" --json out/verify.json
-say "benchmark: under a minute (out/bench.log)"
+say "benchmark: a minute and a half (out/bench.log)"
 logged bench "$facetwise" bench --quick --remote "$address" --json out/report.json
 say "done"
 echo

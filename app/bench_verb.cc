@@ -71,21 +71,21 @@ Verb add_bench(CLI::App& app) {
   BenchOptions& options = arguments->options;
   CLI::App& command = *app.add_subcommand("bench", "Measure throughput, the machine's limits and rejection counts");
   command.footer(
-      R"(Implementations: scalar (plain std:: code, as a renderer contains it), one-lane (the kernel without
+      R"(Implementations: scalar (plain std:: code, as a renderer contains it), auto (the same, vectorised by gcc), one-lane (the kernel without
 vectors), simd (one thread), simd-threads, and remote (with --remote). Each result is shown beside the
 machine's limits.
-Names are OPERATION/SAMPLER/ALPHA_X,ALPHA_Y/BATCH/IMPLEMENTATION, with DISTRIBUTION-MASKING/ before SAMPLER
+Names are OPERATION/SAMPLER/ALPHA_X,ALPHA_Y/BATCH/IMPLEMENTATION ("mixed" for the roughness that differs by lane), with DISTRIBUTION-MASKING/ before SAMPLER
 for other models than GGX with Smith masking.
 
 Examples:
   facetwise bench --quick --json report.json
   facetwise bench --remote unix:/tmp/facetwise.sock
-  facetwise bench --filter 'sample_reflection/exact/0.3,0.3/65536/.*' --min-seconds 1
+  facetwise bench --filter 'sample_reflection/exact/mixed/65536/.*' --min-seconds 1
   facetwise bench --filter 'sample_reflection/beckmann-smith/visible/0.3,0.3/65536/.*'
   facetwise bench --at render7:7777 --filter 'sample_reflection/.*/65536/simd$')");
   command.add_option("--filter", options.filter, "Run the benchmarks whose names contain this regular expression")
       ->option_text("REGEX");
-  auto* quick = command.add_flag("--quick", arguments->quick, "Fewer: about 50 seconds; default at most 3 minutes");
+  auto* quick = command.add_flag("--quick", arguments->quick, "Fewer: a minute and a half; default three minutes");
   auto* full = command.add_flag("--full", arguments->full, "All: about an hour")->excludes(quick);
   command.add_option("--min-seconds", options.min_seconds, "Seconds that each benchmark runs, up to 10; default 0.2")
       ->option_text("S");

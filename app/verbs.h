@@ -22,5 +22,6 @@ Verb add_serve(CLI::App& app);
 Verb add_bench(CLI::App& app);
 Verb add_info(CLI::App& app);
 Verb add_summary(CLI::App& app);
+Verb add_table(CLI::App& app);
 
 }  // namespace facetwise::app

@@ -16,8 +16,8 @@
 namespace facetwise {
 
 enum class BenchSuite {
-  standard,  // what shows the headline: at most 3 minutes
-  quick,     // the same at 64 k lanes only, fewer operations: about 50 seconds
+  standard,  // what shows the headline: three minutes
+  quick,     // the same at 64 k lanes only, fewer operations: a minute and a half
   full,      // every operation, sampler, implementation, batch and roughness: about an hour
 };
 
