@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 
 namespace facetwise::test {
 namespace {
@@ -144,7 +145,7 @@ bool fits(const Call& call) {
   return check(call.operation, make_batch(call, lanes, answer)).ok();
 }
 
-void add_model(const Model& model, bool moments, std::vector<Call>& calls) {
+void add_model(const Model& model, bool moments, std::vector<Call>& calls, std::set<std::string>& names) {
   std::size_t turn = calls.size();
   for (const Operation operation : all_operations()) {
     Model varied = model;
@@ -152,9 +153,8 @@ void add_model(const Model& model, bool moments, std::vector<Call>& calls) {
     const auto add = [&](Sampler sampler, bool values_alone) {
       Call call{operation, sampler, Shadowing::correlated, varied, moments, values_alone};
       vary(call, ++turn);
-      const auto same = [&](const Call& other) { return call_name(other) == call_name(call); };
-      if (std::any_of(calls.begin(), calls.end(), same)) return;  // plain GGX
-      if (!moments || fits(call)) calls.push_back(call);
+      if (moments && !fits(call)) return;
+      if (names.insert(call_name(call)).second) calls.push_back(call);  // those of plain GGX are there
     };
     if (operation == Operation::evaluate_reflection) add(Sampler::visible, true);
     if (operation == Operation::masking) add(Sampler::visible, false);
@@ -170,12 +170,16 @@ std::vector<Call> plain_calls() {
   return calls;
 }
 
-std::vector<Call> all_calls() {
+namespace {
+
+std::vector<Call> make_all_calls() {
   std::vector<Call> calls;
   add_plain(calls);
-  for (const Model& model : all_models()) add_model(model, false, calls);
+  std::set<std::string> names;
+  for (const Call& call : calls) names.insert(call_name(call));
+  for (const Model& model : all_models()) add_model(model, false, calls, names);
   for (const Model& model : all_models())
-    if (takes_slopes(model)) add_model(model, true, calls);
+    if (takes_slopes(model)) add_model(model, true, calls, names);
 #ifdef FACETWISE_QUICK
   // For an emulator: all of plain GGX, and of the models every seventh.
   const std::size_t plain = plain_calls().size();
@@ -183,6 +187,14 @@ std::vector<Call> all_calls() {
   for (std::size_t k = plain; k < calls.size(); k += 7) calls[kept++] = calls[k];
   calls.resize(kept);
 #endif
+  return calls;
+}
+
+}  // namespace
+
+// Once in a process: each of a suite's tests is one, and an emulator takes a second to make them for every suite.
+const std::vector<Call>& all_calls() {
+  static const std::vector<Call> calls = make_all_calls();
   return calls;
 }
 

@@ -29,7 +29,7 @@ std::string call_name(const Call& call);
 void PrintTo(const Call& call, std::ostream* to);  // for GoogleTest
 // Every operation of GGX with Smith masking, with every sampler and shadowing that changes its answer; then of every
 // model with every sampler that fits, where what else a model can be goes round with them.
-std::vector<Call> all_calls();
+const std::vector<Call>& all_calls();
 // Those of GGX with Smith masking that reflects all.
 std::vector<Call> plain_calls();
 bool is_plain(const Call& call);
