@@ -9,7 +9,6 @@
 #include "app/verbs.h"
 #include "facetwise/client.h"
 #include "facetwise/slope_table.h"
-#include "wire/fields.h"
 
 namespace facetwise::app {
 

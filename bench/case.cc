@@ -13,8 +13,8 @@
 namespace facetwise::bench {
 namespace {
 
-constexpr std::size_t kBatches[] = {256, 4096, 65536, std::size_t{1} << 20, std::size_t{1} << 24};
-constexpr std::size_t kBatch = 65536, kLargestBatch = std::size_t{1} << 24;
+constexpr std::size_t kBatch = 65536, kLargestBatch = kFreshLanes;
+constexpr std::size_t kBatches[] = {256, 4096, kBatch, std::size_t{1} << 20, kLargestBatch};
 // Mixed roughness first (Case).
 constexpr std::pair<float, float> kAlphas[] = {{0, 0}, {0.3f, 0.3f}, {0.8f, 0.1f}, {0.01f, 0.01f}, {1.0f, 1.0f}};
 constexpr Implementation kImplementations[] = {Implementation::scalar,       Implementation::auto_vectorised,

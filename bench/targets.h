@@ -11,7 +11,7 @@
 namespace facetwise::bench {
 
 // Lanes that `columns` should have, of either placement: 16 M for batches that do not fit into a cache.
-inline constexpr std::size_t kTargetLanes = std::size_t{1} << 24;
+inline constexpr std::size_t kTargetLanes = kFreshLanes;
 
 // Measures each and appends to report.targets. Stops with Cancelled when `step()` returns false.
 absl::Status measure_targets(const BenchOptions& options, Columns& columns, const std::function<bool()>& step,

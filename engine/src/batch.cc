@@ -9,6 +9,7 @@
 #include "src/stage.h"
 
 namespace facetwise {
+
 absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Execution& execution) {
   const PresentColumns columns(batch);
   if (auto status = check(operation, batch, columns); !status.ok()) return status;
