@@ -75,13 +75,15 @@ bool samples(Operation operation) {
          operation == Operation::sample_transmission || operation == Operation::sample_scattering;
 }
 
-Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine) {
+Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine,
+                   bool ahead) {
   const SurfaceKernels& surface =
       surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine);
   const auto index = static_cast<std::size_t>(sampler);
   switch (operation) {
     case Operation::sample_normal: return samples_normals(sampler) ? surface.sample[index] : nullptr;
-    case Operation::sample_reflection: return surface.sample[index];
+    case Operation::sample_reflection:
+      return ahead && surface.sample_ahead[index] ? surface.sample_ahead[index] : surface.sample[index];
     case Operation::pdf_reflection:
     case Operation::evaluate_reflection: return surface.query[index];
     case Operation::masking: return surface.masking;

@@ -22,6 +22,7 @@ struct Plan {
   // on a line: columns from malloc share one place in their lines.
   std::size_t head = 0;
   unsigned streamed = 0;  // Tile::streamed of tiles that begin at `head` or a multiple of kLine beyond
+  bool ahead = false;     // inputs, and outputs that are not streamed, are fetched ahead
   bool buffers = false;   // some column goes by way of buffers in every tile
 
   // The columns that there are, by the tile's indices.

@@ -41,6 +41,7 @@ class Stage {
       load(begin, in_place);
       if (plan_.generator) generate(begin);
       const bool staged = point_outputs(begin, in_place);
+      if (plan_.ahead) point_ahead(begin, in_place);
       plan_.kernel(tile_, statistics);
       if (staged) store(begin);
       begin += lanes;
@@ -112,6 +113,21 @@ class Stage {
       staged |= !direct;
     }
     return staged;
+  }
+
+  // Each column at a distance of its own; beyond a column's end nothing happens.
+  void point_ahead(std::size_t begin, bool in_place) {
+    constexpr std::size_t kFirst = 4 * kLine, kStep = 8 * kLine;
+    tile_.ahead_count = 0;
+    if (!in_place) return;
+    const auto add = [&](const float* data) {
+      const std::size_t distance = kFirst + kStep * tile_.ahead_count;
+      tile_.ahead[tile_.ahead_count++] = data + begin + distance;
+    };
+    for (std::size_t c = 0; c < plan_.per_lane_count; ++c)
+      if (plan_.per_lane[c].contiguous) add(plan_.per_lane[c].column->data());
+    for (std::size_t c = 0; c < plan_.out_count; ++c)
+      if (plan_.out[c].contiguous && !(plan_.streamed & 1u << plan_.out[c].index)) add(plan_.out[c].column->data());
   }
 
   void store(std::size_t begin) {

@@ -47,6 +47,8 @@ struct Tile : TileConstants {
   std::uint8_t* event = nullptr;   // likewise
   const float* in[kInputs];        // those that the operation reads, the optional ones too
   float* out[kOutputs];            // the wanted ones
+  std::size_t ahead_count = 0;     // for kernels that fetch ahead: columns, as far ahead as each is fetched
+  const float* ahead[std::size_t{kInputs} + kOutputs];
 };
 
 // Adds the tile's lanes that are not accepted to the statistics.
@@ -67,6 +69,7 @@ struct PhiloxTile {
 inline constexpr std::size_t kSamplers = static_cast<std::size_t>(Sampler::visible) + 1;
 struct SurfaceKernels {
   Kernel sample[kSamplers] = {};         // sample_normal, sample_reflection
+  Kernel sample_ahead[kSamplers] = {};   // the same, fetching ahead
   Kernel query[kSamplers] = {};          // pdf_reflection, evaluate_reflection
   Kernel scatter[kSamplers] = {};        // sample_transmission, sample_scattering
   Kernel scatter_query[kSamplers] = {};  // evaluate_transmission, evaluate_scattering
@@ -91,6 +94,8 @@ struct TargetKernels {
 const TargetKernels& kernels(Target target, bool one_lane);
 
 // A batch's kernel, null where the composition has none. `affine`: mean slopes or correlations are given.
-Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine);
+// `ahead`: that which fetches ahead, if there is one.
+Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine,
+                   bool ahead = false);
 
 }  // namespace facetwise

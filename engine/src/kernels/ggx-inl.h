@@ -15,6 +15,7 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 struct Ggx : DistributionTraits {
+  static constexpr bool kWaitsForMemory = true;
   static constexpr bool kHasShareUnoccluded = true;
   static constexpr bool kCavityBehind = true;
 

@@ -28,6 +28,8 @@ struct Registrar {
     const auto index = static_cast<std::size_t>(sampler);
     using T = std::conditional_t<Drawer::kExact || S::Distribution::kLongChains, Pairs, D>;
     kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
+    if constexpr (S::Distribution::kWaitsForMemory && kStreams<D>)
+      kernels.sample_ahead[index] = ForEachVector<T, Sample<T, S, Drawer>, true>;
     kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
     if constexpr (Drawer::kNormals) {
       kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;

@@ -40,6 +40,7 @@ inline constexpr float kSmallestA = 0x1p-50f;
 struct DistributionTraits {
   static constexpr float kLargestRoughness = kLargestAlpha;
   static constexpr bool kShifts = false;              // densities and areas are kept times e^(shift)
+  static constexpr bool kWaitsForMemory = false;      // so quick that large calls wait for their columns
   static constexpr bool kLongChains = false;          // sampling gains from pairs of vectors
   static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
   static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
