@@ -86,7 +86,7 @@ Runner make_runner(const Case& which, const Columns& columns, Target target, Eng
   Execution execution;
   execution.target = target;
   execution.one_lane = which.implementation == Implementation::one_lane;
-  execution.single_thread = which.implementation != Implementation::simd_threads;
+  if (which.implementation != Implementation::simd_threads) execution.threads = Threads::one;
   return in_turn(std::move(batches), [operation, execution, occluded](const Batch& batch) {
     return occluded(run(operation, batch, execution));
   });

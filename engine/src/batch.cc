@@ -20,7 +20,10 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
         absl::StrCat("target: this CPU or build has no ", absl::string_view(wanted.data(), wanted.size())));
   }
   Plan plan;
-  make_plan(operation, batch, columns, kernels(*target, execution.one_lane), execution, plan);
+  // GGX takes a nanosecond or four a lane, the others around ten.
+  const std::size_t positions = batch.active ? batch.active->size() : batch.lanes;
+  const Threading threading(positions, batch.model.distribution == Distribution::ggx ? 65536 : 16384, execution);
+  make_plan(operation, batch, columns, kernels(*target, execution.one_lane), threading.spreads(), execution, plan);
   const auto run_range = [&](std::size_t begin, std::size_t end) {
     const FloatEnvironment ieee;
     const Statistics statistics = Stage(plan).run(begin, end);
@@ -30,7 +33,7 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
   };
 
   Statistics statistics;
-  if (stays_on_thread(plan.positions, execution)) {
+  if (!threading.spreads()) {
     statistics = run_range(0, plan.positions);
   } else {
     std::atomic<std::uint64_t> occluded{0}, smooth{0}, invalid{0};

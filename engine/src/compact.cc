@@ -57,9 +57,10 @@ absl::StatusOr<std::size_t> compact(const Compaction& c, const Execution& execut
   const std::size_t chunk = std::max<std::size_t>((positions + kChunks - 1) / kChunks, 4096);
   const std::size_t chunks = (positions + chunk - 1) / chunk;
   std::array<std::size_t, kChunks + 1> first{};
+  const Threading threading(positions, 262144, execution);  // a nanosecond a lane or less
   const auto for_each_chunk = [&](const auto& body) {
     const auto one = [&](std::size_t k) { body(k, k * chunk, std::min(positions, (k + 1) * chunk)); };
-    if (execution.single_thread || chunks < 2) {
+    if (!threading.spreads() || chunks < 2) {
       for (std::size_t k = 0; k < chunks; ++k) one(k);
     } else {
       tbb::parallel_for(std::size_t{0}, chunks, one);

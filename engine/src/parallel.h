@@ -1,6 +1,8 @@
 // How a call's lanes spread over threads.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cstddef>
 
 #include "facetwise/target.h"
@@ -9,12 +11,35 @@
 
 namespace facetwise {
 
-// Below this many lanes (some microseconds) a call stays on its thread.
+// Fewer lanes than these (some microseconds) stay on their thread.
 inline constexpr std::size_t kLanesWorthThreads = 8192;
 
-inline bool stays_on_thread(std::size_t positions, const Execution& execution) {
-  return execution.single_thread || positions <= kLanesWorthThreads;
-}
+// Whether a call spreads over threads. TBB's threads look for work for about 130 microseconds, then sleep, and waking
+// one takes 30 or more. So calls that are done sooner, of fewer lanes than `worth_waking`, spread if the last call that
+// could have spread ended a moment ago: in a loop all but the first do.
+class Threading {
+ public:
+  Threading(std::size_t positions, std::size_t worth_waking, const Execution& execution)
+      : may_spread_(execution.threads != Threads::one && positions > kLanesWorthThreads),
+        spreads_(may_spread_ && (execution.threads == Threads::several || positions > worth_waking || awake())) {}
+  ~Threading() {
+    if (may_spread_) last_end_.store(Clock::now().time_since_epoch().count(), std::memory_order_relaxed);
+  }
+  Threading(const Threading&) = delete;
+  Threading& operator=(const Threading&) = delete;
+
+  bool spreads() const { return spreads_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::microseconds kAwake{120};
+  static bool awake() {
+    const Clock::duration last_end{last_end_.load(std::memory_order_relaxed)};
+    return Clock::now().time_since_epoch() - last_end < kAwake;
+  }
+  static inline std::atomic<Clock::rep> last_end_{0};
+  const bool may_spread_, spreads_;
+};
 
 // Calls body(begin, end) on ranges that make up [0, positions), in the caller's TBB arena. Ranges but the first begin
 // at `head` and a multiple of kUnit lanes: whole vectors of every target.

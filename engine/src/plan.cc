@@ -9,7 +9,6 @@
 #endif
 
 #include "src/composition.h"
-#include "src/parallel.h"
 
 namespace facetwise {
 namespace {
@@ -66,18 +65,18 @@ bool larger_than_caches(const Plan& plan) {
   return plan.positions * sizeof(float) * (plan.per_lane_count + plan.out_count) > cache_bytes();
 }
 
-bool streams(const Plan& plan, const Execution& execution) {
+bool streams(const Plan& plan, bool spreads, const Execution& execution) {
   if (!plan.table->streams || execution.stores == Stores::cached) return false;
   if (execution.stores == Stores::streaming) return true;
   // Vectors of half a line stream too slowly to gain before several threads share the memory.
-  if (plan.table->vector_lanes < kLine && stays_on_thread(plan.positions, execution)) return false;
+  if (plan.table->vector_lanes < kLine && !spreads) return false;
   return larger_than_caches(plan);
 }
 
 }  // namespace
 
 void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
-               const Execution& execution, Plan& plan) {
+               bool spreads, const Execution& execution, Plan& plan) {
   const Model& model = batch.model;
   plan.table = &table;
   const bool affine = is_affine(batch);
@@ -133,7 +132,7 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
     plan.ahead = true;
     plan.kernel = find_kernel(table, operation, model, sampler_of(operation, batch), affine, true);
   }
-  if (!streams(plan, execution)) return;
+  if (!streams(plan, spreads, execution)) return;
   for (std::size_t c = 0; c < plan.out_count; ++c) {
     const auto& [index, column, contiguous] = plan.out[c];
     if (contiguous && lanes_to_line(column->data()) == plan.head) plan.streamed |= 1u << index;

@@ -47,8 +47,8 @@ struct Plan {
   const OutputColumn<std::uint8_t>* bytes[kByteOutputs] = {};  // null: absent
 };
 
-// The batch is checked; it and `columns` live as long as the plan.
+// The batch is checked; it and `columns` live as long as the plan. `spreads`: over several threads.
 void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
-               const Execution& execution, Plan& plan);
+               bool spreads, const Execution& execution, Plan& plan);
 
 }  // namespace facetwise

@@ -59,14 +59,14 @@ TEST(Allocation, NoneByCalls) {
       strided.generator = Generator{.seed = 1};
     }
     for (const Batch& batch : {contiguous, listed, strided})
-      for (const bool single_thread : {true, false}) {
-        const Execution execution = {.single_thread = single_thread};
+      for (const Threads threads : {Threads::one, Threads::several}) {
+        const Execution execution = {.threads = threads};
         ASSERT_TRUE(run(call.operation, batch, execution).ok()) << call_name(call);
         const std::size_t before = allocations;
         const bool ok = run(call.operation, batch, execution).ok();
         const std::size_t after = allocations;
         EXPECT_TRUE(ok);
-        EXPECT_EQ(after - before, 0u) << call_name(call) << (single_thread ? ", one thread" : "");
+        EXPECT_EQ(after - before, 0u) << call_name(call) << (threads == Threads::one ? ", one thread" : "");
       }
   }
 }
@@ -79,10 +79,10 @@ TEST(Allocation, NoneByCompaction) {
   compaction.lanes = status.size();
   compaction.status = status;
   compaction.index = index;
-  for (const bool single_thread : {true, false}) {
-    ASSERT_TRUE(compact(compaction, {.single_thread = single_thread}).ok());
+  for (const Threads threads : {Threads::one, Threads::several}) {
+    ASSERT_TRUE(compact(compaction, {.threads = threads}).ok());
     const std::size_t before = allocations;
-    const auto accepted = compact(compaction, {.single_thread = single_thread});
+    const auto accepted = compact(compaction, {.threads = threads});
     EXPECT_EQ(allocations - before, 0u);
     EXPECT_EQ(*accepted, 66666u);
   }

@@ -71,7 +71,7 @@ TEST(Environment, FlushToZero) {
   ASSERT_TRUE(flushes(kDefault | kFlush)) << "the mode that this test is about";
   ASSERT_FALSE(flushes(kDefault));
   for (const Target target : available_targets())
-    expect_same_under(kDefault | kFlush, kQuick ? 1000 : 5000, {.target = target, .single_thread = true});
+    expect_same_under(kDefault | kFlush, kQuick ? 1000 : 5000, {.target = target, .threads = Threads::one});
 }
 
 TEST(Environment, RoundingModes) {
@@ -82,7 +82,7 @@ TEST(Environment, RoundingModes) {
   ASSERT_GT(third(kDefault | kUp, -1), -nearest);
   for (const Register rounding : {kDown, kUp, kToZero}) {
     for (const Target target : available_targets())
-      expect_same_under(kDefault | rounding, kQuick ? 500 : 5000, {.target = target, .single_thread = true});
+      expect_same_under(kDefault | rounding, kQuick ? 500 : 5000, {.target = target, .threads = Threads::one});
     expect_same_under(kDefault | rounding | kFlush, 700, {});
   }
 }
@@ -90,15 +90,15 @@ TEST(Environment, RoundingModes) {
 // Worker threads have registers of their own, or get the caller's.
 TEST(Environment, WithThreads) {
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
-  expect_same_under(kDefault | kFlush | kDown, kQuick ? 20000 : 60000, {});
+  expect_same_under(kDefault | kFlush | kDown, kQuick ? 20000 : 60000, {.threads = Threads::several});
 }
 
 #if defined(__x86_64__)
 // A caller that traps on every exception, and one that keeps the sticky flags in view: both are in the
 // register.
 TEST(Environment, TrapsAndStickyFlags) {
-  expect_same_under(0, 5000, {.single_thread = true});
-  expect_same_under(kDefault | 0x3F, 1000, {.single_thread = true});
+  expect_same_under(0, 5000, {.threads = Threads::one});
+  expect_same_under(kDefault | 0x3F, 1000, {.threads = Threads::one});
 }
 #endif
 

@@ -78,14 +78,14 @@ TEST(ForcedTarget, IsTheOneThatRuns) {
     if (operation >= Operation::sample_transmission) call.model.interface = Interface::dielectric;
     for (const Target target : available_targets())
       for (const bool one_lane : {false, true}) {
-        const auto kernels = profile(call, lanes, {target, one_lane, true});
+        const auto kernels = profile(call, lanes, {.target = target, .one_lane = one_lane, .threads = Threads::one});
         const std::string expected = names.at(target) + " " + std::to_string(one_lane ? 1 : vector_lanes(target));
         ASSERT_EQ(kernels.size(), 1u) << call_name(call) << ", " << name(target);
         EXPECT_EQ(kernels.begin()->first, expected) << call_name(call);
       }
   }
   // Where no target is named, the best one runs.
-  const auto kernels = profile(all_calls().back(), lanes, {.single_thread = true});
+  const auto kernels = profile(all_calls().back(), lanes, {.threads = Threads::one});
   const Target best = available_targets().front();
   ASSERT_EQ(kernels.size(), 1u);
   EXPECT_EQ(kernels.begin()->first, names.at(best) + " " + std::to_string(vector_lanes(best)));

@@ -59,7 +59,7 @@ TEST(Generator, NumbersOfTheLanesIndex) {
       const Answer expected = compute(call, columns);
       for (const Target target : available_targets())
         for (const bool one_lane : {false, true})
-          expect_same(call, expected, generate(call, lanes, generator, {target, one_lane, false}));
+          expect_same(call, expected, generate(call, lanes, generator, {.target = target, .one_lane = one_lane}));
     }
   }
 }

@@ -152,15 +152,15 @@ TEST_F(CacheLines, StreamsOfManyThreads) {
   const std::size_t count = kQuick ? 20'003 : 200'003;
   const Lanes lanes = hard_lanes(Kind::mixed, count, 93);
   for (const Call& call : plain_calls()) {
-    const Answer expected = compute(call, lanes, {.single_thread = true, .stores = Stores::cached});
-    expect_same(call, expected, compute(call, lanes, {.stores = Stores::streaming}));
+    const Answer expected = compute(call, lanes, {.threads = Threads::one, .stores = Stores::cached});
+    expect_same(call, expected, compute(call, lanes, {.threads = Threads::several, .stores = Stores::streaming}));
     Lanes over = lanes;
     Answer got;
     Batch batch = make_batch(call, over, got);
     std::size_t to = 0;
     for (std::size_t k = 0; k < got.out.size(); ++k)
       if (writes(call, output_fields()[k])) output_fields()[k].column(batch) = {over.in[to++].data(), count};
-    got.statistics = run_ok(call, batch, {.stores = Stores::streaming});
+    got.statistics = run_ok(call, batch, {.threads = Threads::several, .stores = Stores::streaming});
     to = 0;
     for (std::size_t k = 0; k < got.out.size(); ++k)
       if (writes(call, output_fields()[k])) got.out[k] = over.in[to++];

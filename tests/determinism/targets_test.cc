@@ -13,11 +13,11 @@ constexpr std::size_t kLanes = kQuick ? 3000 : 60'000;
 
 void expect_targets_agree(const Lanes& lanes) {
   for (const Call& call : all_calls()) {
-    const Answer expected = compute(call, lanes, {.single_thread = true});
+    const Answer expected = compute(call, lanes, {.threads = Threads::one});
     for (const Target target : available_targets())
       for (const bool one_lane : {false, true}) {
         SCOPED_TRACE(std::string(name(target)) + (one_lane ? ", one lane" : ""));
-        expect_same(call, expected, compute(call, lanes, {target, one_lane, true}));
+        expect_same(call, expected, compute(call, lanes, {.target = target, .one_lane = one_lane, .threads = Threads::one}));
       }
     if (testing::Test::HasFailure()) return;
   }

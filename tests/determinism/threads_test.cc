@@ -20,17 +20,17 @@ TEST(Threads, AnyNumber) {
   for (std::size_t lane = kLanes; lane-- > 0;)
     if (lane % 3 != 0) active.push_back(static_cast<std::uint32_t>(lane));
   for (const Call& call : all_calls()) {
-    const Answer expected = compute(call, lanes, {.single_thread = true});
+    const Answer expected = compute(call, lanes, {.threads = Threads::one});
     EXPECT_EQ(expected.statistics, recount(expected.status)) << call_name(call);
     for (const std::size_t threads : {1u, 2u, 5u}) {
       SCOPED_TRACE(std::to_string(threads) + " threads");
       const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-      expect_same(call, expected, compute(call, lanes));
+      expect_same(call, expected, compute(call, lanes, {.threads = Threads::several}));
 
       Answer got;
       Batch batch = make_batch(call, lanes, got);
       batch.active = active;
-      const Statistics statistics = run_ok(call, batch);
+      const Statistics statistics = run_ok(call, batch, {.threads = Threads::several});
       std::vector<std::uint8_t> status;
       for (const std::uint32_t lane : active) {
         expect_same_lane(call, expected, lane, got, lane);
@@ -45,10 +45,10 @@ TEST(Threads, AnyNumber) {
 TEST(Threads, CallersArena) {
   const Lanes lanes = hard_lanes(Kind::mixed, kLanes, 62);
   for (const Call& call : all_calls()) {
-    const Answer expected = compute(call, lanes, {.single_thread = true});
+    const Answer expected = compute(call, lanes, {.threads = Threads::one});
     for (const int threads : {1, 2}) {
       tbb::task_arena arena(threads);
-      arena.execute([&] { expect_same(call, expected, compute(call, lanes)); });
+      arena.execute([&] { expect_same(call, expected, compute(call, lanes, {.threads = Threads::several})); });
     }
   }
 }
@@ -58,7 +58,7 @@ TEST(Threads, ConcurrentCalls) {
   const Lanes lanes = hard_lanes(Kind::mixed, 9000, 63);
   const auto calls = all_calls();
   std::vector<Answer> expected, got(calls.size());
-  for (const Call& call : calls) expected.push_back(compute(call, lanes, {.single_thread = true}));
+  for (const Call& call : calls) expected.push_back(compute(call, lanes, {.threads = Threads::one}));
   tbb::parallel_for(std::size_t{0}, calls.size(), [&](std::size_t k) { got[k] = compute(calls[k], lanes); });
   for (std::size_t k = 0; k < calls.size(); ++k) expect_same(calls[k], expected[k], got[k]);
 

@@ -32,7 +32,7 @@ struct Spoilt {
     EXPECT_EQ(accepted.status().code(), absl::StatusCode::kInvalidArgument) << accepted.status();
     EXPECT_EQ(std::string(accepted.status().message()).substr(0, field.size() + 2), field + ": ");
     EXPECT_EQ(check(call), accepted.status());
-    EXPECT_EQ(compact(call, {.single_thread = true}).status(), accepted.status());
+    EXPECT_EQ(compact(call, {.threads = Threads::one}).status(), accepted.status());
     EXPECT_EQ(local_engine()->compact(call).status(), accepted.status());
     const Spoilt whole;
     EXPECT_EQ(status, whole.status);

@@ -76,10 +76,10 @@ TEST(Compact, StableForAnySizeShareAndThreads) {
       const Queue queue = make_queue(lanes, share, lanes + share);
       for (const bool active : {false, true}) {
         SCOPED_TRACE(std::to_string(lanes) + " lanes, share " + std::to_string(share));
-        expect_compacted(queue, active, {.single_thread = true});
+        expect_compacted(queue, active, {.threads = Threads::one});
         for (const std::size_t threads : {1u, 2u}) {
           const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-          expect_compacted(queue, active, {});
+          expect_compacted(queue, active, {.threads = Threads::several});
         }
         if (HasFatalFailure()) return;
       }

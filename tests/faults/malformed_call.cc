@@ -23,7 +23,7 @@ void MalformedCall::refused(std::string_view field) {
   EXPECT_EQ(message.substr(0, start.size()), start);
   EXPECT_GT(message.size(), start.size()) << "it says what is wrong";
   for (const Execution& execution :
-       {Execution{}, Execution{.single_thread = true}, Execution{.target = Target::scalar}})
+       {Execution{}, Execution{.threads = Threads::one}, Execution{.target = Target::scalar}})
     EXPECT_EQ(run(call_.operation, batch, execution).status(), checked);
   EXPECT_EQ(local_engine()->run(call_.operation, batch).status(), checked);
 

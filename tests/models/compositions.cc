@@ -401,7 +401,7 @@ std::vector<Result> draw(Operation operation, const Composition& c, const Point&
   Batch batch = make_batch(operation, c, {&point, 1}, results);
   batch.u1 = batch.u2 = batch.u3 = {};
   batch.generator = Generator{.seed = seed};
-  const auto ran = run(operation, batch, {.single_thread = true});
+  const auto ran = run(operation, batch, {.threads = Threads::one});
   EXPECT_TRUE(ran.ok()) << describe(c) << ran.status();
   if (statistics && ran.ok()) *statistics = *ran;
   return results;

@@ -67,7 +67,7 @@ Batch make_batch(Operation operation, const Composition& composition, std::span<
                  std::span<Result> results);
 // Runs it; a failure of the test where the call is refused.
 std::vector<Result> run_points(Operation operation, const Composition& composition, std::span<const Point> points,
-                               const Execution& execution = {.single_thread = true});
+                               const Execution& execution = {.threads = Threads::one});
 
 // What the reference calls this lane: the composition with the point's floats.
 reference::Surface surface_of(const Composition& composition, const Point& point);

@@ -434,7 +434,7 @@ TEST_P(ModelConsistency, SameBitsOnEveryTarget) {
       for (const Target target : available_targets())
         for (const bool one_lane : {false, true}) {
           const std::vector<Result> other = comparable(
-              run_points(operation, c, points, {.target = target, .one_lane = one_lane, .single_thread = true}));
+              run_points(operation, c, points, {.target = target, .one_lane = one_lane, .threads = Threads::one}));
           for (std::size_t n = 0; n < points.size(); ++n)
             ASSERT_EQ(std::memcmp(&best[n], &other[n], sizeof(Result)), 0)
                 << name(operation) << " " << describe(c) << name(target) << (one_lane ? " one lane" : "") << ": "

@@ -34,7 +34,7 @@ Statistics draw(const Draw& what, const std::function<void(const Drawn&)>& each)
     }
     batch.out.status = OutputColumn<std::uint8_t>(status.data(), lanes);
     Execution execution;
-    execution.single_thread = true;
+    execution.threads = Threads::one;
     const auto statistics = run(what.operation, batch, execution);
     if (!statistics.ok()) throw std::runtime_error(std::string(statistics.status().message()));
     total += *statistics;

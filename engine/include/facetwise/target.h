@@ -39,13 +39,19 @@ enum class Stores : std::uint8_t {
   streaming = 2,
 };
 
+// On how many threads a call of more than some thousand lanes runs. Others' threads are those of the caller's TBB arena.
+enum class Threads : std::uint8_t {
+  automatic = 0,  // several where it pays: a short call does not wake threads that sleep
+  one = 1,        // the calling one
+  several = 2,
+};
+
 // How a call runs. The defaults are right for everything but tests and benchmarks.
 struct Execution {
   Target target = Target::best;
   // Kernels one lane wide on the same target: what the vector width is worth. For benchmarks.
   bool one_lane = false;
-  // Stay on the calling thread. Otherwise work spreads over the caller's TBB arena.
-  bool single_thread = false;
+  Threads threads = Threads::automatic;
   Stores stores = Stores::automatic;
 };
 

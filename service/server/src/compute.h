@@ -23,7 +23,7 @@ class Compute {
   template <class Body>
   auto run(int calls, const Body& body) {
     Execution execution = execution_;
-    execution.single_thread = calls >= threads();
+    if (calls >= threads()) execution.threads = Threads::one;
     return arena_.execute([&] { return body(execution); });
   }
 
