@@ -33,7 +33,8 @@ CLI::Option* add_named(CLI::App& app, const std::string& flag, T& value, Parse p
 
 inline constexpr const char* kSamplerNames = "ndf|heitz|cap|bounded|exact|visible";
 
-// --distribution, --masking, --shadowing, --normalisation, --interface, --transport, --retro.
+// --distribution, --masking, --shadowing, --normalisation, --interface, --transport, --compensation,
+// --retro.
 struct ModelArguments {
   Model model;
   std::string table;  // of `--distribution table:FILE`

@@ -3,13 +3,17 @@
 #include <fmt/ranges.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
 
 #include "app/arguments.h"
+#include "app/errors.h"
 #include "app/file_call.h"
+#include "app/progress.h"
 #include "app/verbs.h"
+#include "facetwise/albedo_table.h"
 
 namespace facetwise::app {
 namespace {
@@ -38,7 +42,34 @@ struct FileVerb {
   ModelArguments model;
   EngineArguments engine;
   std::optional<Sampler> sampler;
+  std::string albedo_table;
   bool json = false;
+
+  // The table of albedo that the call reads, if it does: built with progress, or read from --albedo-table. A server
+  // has its own.
+  absl::Status prepare_albedo() const {
+    if (call.operation != Operation::albedo && call.model.compensation == Compensation::none) {
+      if (albedo_table.empty()) return absl::OkStatus();
+      return invalid("--albedo-table: read by `facetwise albedo` and with --compensation only");
+    }
+    if (!engine.remote.empty()) {
+      if (albedo_table.empty()) return absl::OkStatus();
+      return invalid("--albedo-table: a server has its own; leave out --albedo-table or --remote");
+    }
+    if (!albedo_table.empty() && std::filesystem::exists(albedo_table)) {
+      auto table = AlbedoTable::load(albedo_table);
+      if (!table.ok()) return table.status();
+      if (!(*table)->fits(call.model))
+        return invalid("{}: a table of {}; --albedo-table needs one of the model", albedo_table,
+                       (*table)->description());
+      use_albedo_table(*std::move(table));
+      return absl::OkStatus();
+    }
+    Progress progress("facetwise: table of albedo");
+    const auto table = facetwise::albedo_table(call.model, [&](double done) { progress(done); });
+    if (!table.ok()) return table.status();
+    return albedo_table.empty() ? absl::OkStatus() : (*table)->save(albedo_table);
+  }
 };
 
 // A flag that makes another operation of the verb.
@@ -76,8 +107,9 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
     return;
   }
   fmt::print(stderr, "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
-             verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid, name(result.sampler),
-             verb_arguments.engine.shown(), 1e3 * result.seconds);
+             verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid,
+             call.operation == Operation::albedo ? "table" : name(result.sampler), verb_arguments.engine.shown(),
+             1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
 }
@@ -93,20 +125,28 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   command.add_option("-o,--output", call.output, "File to write; default -. It appears when it is complete")
       ->type_name("FILE");
   arguments->model.add(command);
-  add_named(command, "--sampler", arguments->sampler, parse_sampler,
-            operation == Operation::sample_reflection
-                ? "How directions are drawn; default exact where the model has it, else visible"
-                : "The sampler whose pdf is meant; default exact where the model has it, else visible",
-            kSamplerNames);
+  const bool samples = operation != Operation::albedo;
+  if (samples)
+    add_named(command, "--sampler", arguments->sampler, parse_sampler,
+              operation == Operation::sample_reflection
+                  ? "How directions are drawn; default exact where the model has it, else visible"
+                  : "The sampler whose pdf is meant; default exact where the model has it, else visible",
+              kSamplerNames);
   command.add_option("--alpha", call.alpha, "Roughness of all lanes: alpha_x and, if it differs, alpha_y")
       ->expected(1, 2)
       ->type_name("X [Y]");
   const auto add_constant = [&](const char* flag, std::optional<float>& value, const char* help) {
     command.add_option(flag, value, help)->option_text("X");
   };
-  add_constant("--eta", call.eta, "eta of all lanes");
-  add_constant("--f0", call.f0, "f0 of all lanes");
-  add_constant("--f90", call.f90, "f90 of all lanes");
+  if (samples) {
+    add_constant("--eta", call.eta, "eta of all lanes");
+    add_constant("--f0", call.f0, "f0 of all lanes");
+    add_constant("--f90", call.f90, "f90 of all lanes");
+  }
+  command
+      .add_option("--albedo-table", arguments->albedo_table,
+                  "Where the table of albedo is kept: read if it is there, else computed (seconds) and written")
+      ->type_name("FILE");
   std::vector<CLI::Option*> others;
   for (const Variant& variant : variants) {
     auto* flag = command.add_flag_callback(
@@ -129,6 +169,7 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
             if (!model.ok()) return fail(verb, model.status());
             call.model = *std::move(model);
             call.sampler = arguments->sampler;
+            if (const auto status = arguments->prepare_albedo(); !status.ok()) return fail(verb, status);
             auto engine = arguments->engine.open();
             if (!engine.ok()) return fail(verb, engine.status());
             const auto result = run_on_files(call, **engine);
@@ -182,6 +223,17 @@ Verb add_evaluate(CLI::App& app) {
 )" + kStatus + R"(
 Example:
   facetwise evaluate --shadowing uncorrelated --alpha 0.3 --input pairs.csv --output values.csv)");
+}
+
+Verb add_albedo(CLI::App& app) {
+  return add_file_verb(app, "albedo", Operation::albedo, {},
+                       "What share of the light from each direction a surface reflects, by one scattering with F = 1",
+                       std::string(kFiles) + R"(Written:
+  albedo           of that direction; a smooth lane has 1
+  mean_albedo      the average over the hemisphere, by the cosine
+)" + kStatus + R"(
+Example:
+  facetwise albedo --alpha 0.5 --input directions.csv --output albedo.csv --albedo-table ggx.albedo)");
 }
 
 }  // namespace facetwise::app

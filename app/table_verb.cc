@@ -1,15 +1,14 @@
 // table: builds a table of slopes once, so that calls do not.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <chrono>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "app/arguments.h"
 #include "app/errors.h"
+#include "app/progress.h"
 #include "app/verbs.h"
 #include "facetwise/slope_table.h"
 
@@ -23,19 +22,11 @@ struct TableVerb {
   int run() const {
     SlopeTable::Options options;
     options.radial = radial;
-    // On a terminal one line that changes, else a line for each tenth.
-    const bool terminal = isatty(STDERR_FILENO) != 0;
-    int shown = -1;
-    options.progress = [&](double done) {
-      const int percent = static_cast<int>(100 * done);
-      if (percent == shown || (!terminal && percent / 10 == shown / 10 && shown >= 0)) return;
-      shown = percent;
-      fmt::print(stderr, "{}facetwise table: {} %{}", terminal ? "\r" : "", percent, terminal ? "" : "\n");
-      std::fflush(stderr);
-    };
+    auto progress = std::make_unique<Progress>("facetwise table");
+    options.progress = [&](double done) { (*progress)(done); };
     const auto start = std::chrono::steady_clock::now();
     const auto table = SlopeTable::load_any(input, options);
-    if (terminal && shown >= 0) fmt::print(stderr, "\n");
+    progress.reset();
     if (!table.ok()) return fail("table", table.status());
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (const auto status = (*table)->save(output); !status.ok()) return fail("table", status);

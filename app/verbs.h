@@ -17,6 +17,7 @@ struct Verb {
 Verb add_sample(CLI::App& app);
 Verb add_pdf(CLI::App& app);
 Verb add_evaluate(CLI::App& app);
+Verb add_albedo(CLI::App& app);
 Verb add_verify(CLI::App& app);
 Verb add_serve(CLI::App& app);
 Verb add_bench(CLI::App& app);

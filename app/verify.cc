@@ -138,7 +138,7 @@ struct Inputs {
         u3 = uniform_numbers(lanes.size(), 3 * seed + 2);
         batch.u3 = u3;
       }
-    } else if (what.operation != Operation::masking) {
+    } else if (reads(what.operation, "outgoing.x")) {
       // Directions that light comes from: by visible normals, some of them on the wrong side.
       for (auto* column : {&ox, &oy, &oz}) column->resize(lanes.size());
       Batch directions = batch;
@@ -179,6 +179,10 @@ void add_ggx_smith(std::span<const Sampler> samplers, std::vector<VerifyCase>& c
                    .model = {.shadowing = Shadowing::uncorrelated},
                    .sampler = samplers[samplers.size() > 1 ? samplers.size() - 2 : 0]});
   cases.push_back({.operation = Operation::masking, .sampler = samplers.back()});
+  cases.push_back({.operation = Operation::albedo, .sampler = samplers.back()});
+  cases.push_back({.operation = Operation::sample_reflection,
+                   .model = {.interface = Interface::schlick, .compensation = Compensation::turquin},
+                   .sampler = samplers.back()});
 }
 
 // What `samplers` have of a composition, each operation that reads a sampler with each that fits. What else a model
@@ -188,7 +192,7 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
   bool any = false;
   std::size_t turn = 0;
   for (const Operation operation : all_operations()) {
-    const bool scatters = operation >= Operation::sample_transmission;
+    const bool scatters = operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
     if (ggx_smith && !scatters) continue;  // add_ggx_smith()
     Model model = composition;
     model.interface = scatters ? Interface::dielectric : Interface::conductor;

@@ -46,13 +46,14 @@ std::string sampler_name(const VerifyCase& what) {
 std::string shown(const VerifyCase& what) {
   std::string text(name(what.operation));
   const bool samples = text.starts_with("sample_");
-  if (what.operation != Operation::masking)
+  if (what.operation != Operation::masking && what.operation != Operation::albedo)
     text += fmt::format(" {}", sampler_name(what));
   else if (const std::string model = model_name(name(what.model.distribution), name(what.model.masking));
            !model.empty())
     text += " " + model;
   if (what.model.shadowing != Shadowing::correlated) text += fmt::format(" {}", name(what.model.shadowing));
   if (what.model.interface != Interface::conductor) text += fmt::format(" {}", name(what.model.interface));
+  if (what.model.compensation != Compensation::none) text += fmt::format(" {}", name(what.model.compensation));
   if (what.model.retro) text += " retro";
   if (what.moments) text += " moments";
   if (samples) text += what.generator ? " by seed" : " by columns";

@@ -28,7 +28,7 @@ constexpr Sampler kGgxSamplers[] = {Sampler::ndf, Sampler::heitz, Sampler::cap, 
 
 bool has_baseline(const Case& which) {
   if (which.inputs == Inputs::generator) return false;  // it takes its random numbers only from columns
-  if (which.scatters()) return false;
+  if (which.scatters() || which.operation == Operation::albedo) return false;
   const baseline::Model model{which.distribution, which.masking};
   if (which.sampler) return baseline::has_baseline(model, *which.sampler);
   return baseline::has_baseline(model, Sampler::ndf) &&
@@ -77,7 +77,9 @@ std::vector<Case> model_cases() {
   const auto add = [&](Operation operation, Distribution distribution, Masking masking) {
     const Case which{.operation = operation, .distribution = distribution, .masking = masking, .sampler = std::nullopt};
     const auto samplers = samplers_for(operation, which.model());
-    if (operation == Operation::evaluate_reflection || operation == Operation::masking) cases.push_back(which);
+    if (operation == Operation::evaluate_reflection || operation == Operation::masking ||
+        operation == Operation::albedo)
+      cases.push_back(which);
     for (const Sampler sampler : samplers) {
       if (which.is_ggx_smith() && sampler == Sampler::visible) continue;
       cases.push_back(which);
@@ -88,7 +90,7 @@ std::vector<Case> model_cases() {
     if (model.distribution != Distribution::ggx || model.masking != Masking::smith)
       for (const Operation operation : all_operations()) add(operation, model.distribution, model.masking);
   for (const Operation operation : all_operations())
-    if (operation >= Operation::sample_transmission) add(operation, Distribution::ggx, Masking::smith);
+    if (operation >= Operation::sample_transmission) add(operation, Distribution::ggx, Masking::smith);  // and albedo
   return cases;
 }
 
@@ -201,7 +203,7 @@ int Case::input_columns() const {
   if (inputs != Inputs::one_roughness) columns += 2;
   if (is_sampling()) {
     if (inputs != Inputs::generator) columns += uses_u3() ? 3 : 2;
-  } else if (operation != Operation::masking) {
+  } else if (has_outgoing()) {
     columns += 3;  // outgoing
   }
   return columns;
@@ -268,7 +270,7 @@ absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options) {
 }
 
 int flops(const Case& which) {
-  if (!which.is_ggx_smith() || which.scatters()) return 0;
+  if (!which.is_ggx_smith() || which.scatters() || which.operation == Operation::albedo) return 0;
   const bool isotropic = which.alpha_x == which.alpha_y && !which.is_mixed();
   constexpr int kLength = 6, kPrepare = 9, kSinCos = 19, kReflect = 8, kBound = 20, kShadowing = 17;
   const int cone = isotropic ? 28 : 80;

@@ -37,7 +37,12 @@ struct Case {
            operation == Operation::sample_transmission || operation == Operation::sample_scattering;
   }
   // Of a dielectric; the others' interface is a conductor.
-  bool scatters() const { return operation >= Operation::sample_transmission; }
+  bool scatters() const {
+    return operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
+  }
+  bool has_outgoing() const {  // among its inputs
+    return !is_sampling() && operation != Operation::masking && operation != Operation::albedo;
+  }
   bool is_mixed() const { return alpha_x == 0; }
   // Lanes of the columns that it goes through.
   std::size_t lanes() const { return inputs == Inputs::fresh ? kFreshLanes : batch; }

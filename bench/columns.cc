@@ -79,7 +79,7 @@ absl::Status Columns::prepare(const Case& which) {
   set_roughness(which.alpha_x, which.alpha_y, which.lanes());
   if (which.inputs == Inputs::malloc_placed)
     for (int k = 0; k < kInputs; ++k) std::copy_n(input(k), which.batch, malloc_column(k));
-  if (which.is_sampling() || which.operation == Operation::masking) return absl::OkStatus();
+  if (which.is_sampling() || !which.has_outgoing()) return absl::OkStatus();
   const std::size_t lanes = which.batch;
   const Case drawing{.operation = which.operation == Operation::evaluate_transmission ? Operation::sample_transmission
                                   : which.operation == Operation::evaluate_scattering ? Operation::sample_scattering
@@ -129,7 +129,7 @@ Batch Columns::batch(const Case& which, std::size_t first) const {
       batch.u2 = in(kU2);
       if (which.uses_u3()) batch.u3 = in(kU3);
     }
-  } else if (which.operation != Operation::masking) {
+  } else if (which.has_outgoing()) {
     batch.outgoing = {in(kOx), in(kOy), in(kOz)};
   }
   switch (which.operation) {
@@ -154,6 +154,7 @@ Batch Columns::batch(const Case& which, std::size_t first) const {
       batch.out.pdf = out(1);
       break;
     case Operation::masking: batch.out.masking = out(0); break;
+    case Operation::albedo: batch.out.albedo = out(0); break;
   }
   return batch;
 }

@@ -28,7 +28,10 @@ bool evaluates(Operation operation) {
          operation == Operation::evaluate_scattering;
 }
 
-bool scatters(Operation operation) { return operation >= Operation::sample_transmission; }
+bool scatters(Operation operation) {
+  return operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
+}
+bool has_sampler(Operation operation) { return operation != Operation::masking && operation != Operation::albedo; }
 
 const SurfaceKernels& surface_of(const DistributionKernels& kernels, Masking masking, bool affine) {
   static constexpr SurfaceKernels kNone{};
@@ -58,15 +61,14 @@ std::vector<Sampler> samplers_for(Operation operation, const Model& model, bool 
   std::vector<Sampler> samplers;
   const TargetKernels& table = any_kernels();
   for (const Sampler sampler : all_samplers())
-    if (operation != Operation::masking && find_kernel(table, operation, model, sampler, affine))
-      samplers.push_back(sampler);
+    if (has_sampler(operation) && find_kernel(table, operation, model, sampler, affine)) samplers.push_back(sampler);
   return samplers;
 }
 
 }  // namespace
 
 Sampler sampler_of(Operation operation, const Batch& batch) {
-  const bool reads_it = operation != Operation::masking && (!evaluates(operation) || batch.out.pdf.present());
+  const bool reads_it = has_sampler(operation) && (!evaluates(operation) || batch.out.pdf.present());
   return reads_it ? batch.sampler : Sampler::visible;
 }
 
@@ -91,8 +93,20 @@ Kernel find_kernel(const TargetKernels& table, Operation operation, const Model&
     case Operation::sample_scattering: return surface.scatter[index];
     case Operation::evaluate_transmission:
     case Operation::evaluate_scattering: return surface.scatter_query[index];
+    case Operation::albedo: return surface.albedo;
   }
   return nullptr;
+}
+
+Kernel find_compensation(const TargetKernels& table, const Model& model, bool affine) {
+  return surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine)
+      .compensation;
+}
+
+bool compensated(Operation operation, const Batch& batch) {
+  if (batch.model.compensation == Compensation::none) return false;
+  return (operation == Operation::sample_reflection && batch.out.weight.present()) ||
+         (operation == Operation::evaluate_reflection && batch.out.value.present());
 }
 
 std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
@@ -100,7 +114,7 @@ std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
 }
 
 Sampler default_sampler(Operation operation, const Batch& batch) {
-  const bool exact = operation <= Operation::evaluate_scattering && operation != Operation::masking &&
+  const bool exact = operation <= Operation::albedo && has_sampler(operation) &&
                      find_kernel(any_kernels(), operation, batch.model, Sampler::exact, is_affine(batch));
   return exact ? Sampler::exact : Sampler::visible;
 }
@@ -126,13 +140,14 @@ bool takes_slopes(const Model& model) {
 
 absl::Status check_composition(Operation operation, const Batch& batch) {
   const Model& model = batch.model;
-  if (operation > Operation::evaluate_scattering) return invalid("operation", "unknown value");
+  if (operation > Operation::albedo) return invalid("operation", "unknown value");
   if (model.distribution > Distribution::table) return invalid("model.distribution", "unknown value");
   if (model.masking > Masking::vcavity) return invalid("model.masking", "unknown value");
   if (model.shadowing > Shadowing::uncorrelated) return invalid("model.shadowing", "unknown value");
   if (model.normalisation > Normalisation::biased) return invalid("model.normalisation", "unknown value");
   if (model.interface > Interface::dielectric) return invalid("model.interface", "unknown value");
   if (model.transport > Transport::importance) return invalid("model.transport", "unknown value");
+  if (model.compensation > Compensation::turquin) return invalid("model.compensation", "unknown value");
   if (batch.sampler > Sampler::visible) return invalid("sampler", "unknown value");
 
   const DistributionKernels& distribution = kernels_of(model.distribution);
@@ -164,6 +179,23 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
     return invalid("model.retro", "needs normals that are distributed symmetrically about n: a radial table");
   if (model.retro && (batch.mean_slope_x.present() || batch.mean_slope_y.present()))
     return invalid("model.retro", "needs normals that are distributed symmetrically about n: not with a mean slope");
+
+  const bool asymmetric = skewed || batch.mean_slope_x.present() || batch.mean_slope_y.present();
+  constexpr absl::string_view kSymmetric =
+      "needs normals that are distributed symmetrically about n: no mean slope, a radial table";
+  if (operation == Operation::albedo && model.interface == Interface::dielectric)
+    return invalid("model.interface", "albedo is that of F = 1: a conductor or schlick");
+  if (operation == Operation::albedo && asymmetric)
+    return invalid(skewed                         ? "model.table"
+                   : batch.mean_slope_x.present() ? "mean_slope_x"
+                                                  : "mean_slope_y",
+                   absl::StrCat("albedo ", kSymmetric));
+  if (model.compensation != Compensation::none) {
+    const absl::string_view compensation = named(model.compensation);
+    if (model.interface == Interface::dielectric)
+      return invalid("model.compensation", absl::StrCat(compensation, " needs a conductor or schlick interface"));
+    if (asymmetric) return invalid("model.compensation", absl::StrCat(compensation, " ", kSymmetric));
+  }
 
   if (find_kernel(any_kernels(), operation, model, sampler_of(operation, batch), affine)) return absl::OkStatus();
   const char* with = !affine                             ? ""

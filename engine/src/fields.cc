@@ -22,7 +22,7 @@ constexpr OutputField kOutputFields[] = {FACETWISE_OUTPUT_FIELDS(FACETWISE_FIELD
 constexpr ByteField kByteFields[] = {FACETWISE_BYTE_FIELDS(FACETWISE_FIELD)};
 #undef FACETWISE_FIELD
 
-constexpr std::size_t kOperations = static_cast<std::size_t>(Operation::evaluate_scattering) + 1;
+constexpr std::size_t kOperations = static_cast<std::size_t>(Operation::albedo) + 1;
 
 // Bits of the fields that each operation knows.
 template <class Field, std::size_t kCount>

@@ -18,7 +18,8 @@ inline constexpr unsigned kSample = bit(sample_normal) | kReflected | kScattered
 inline constexpr unsigned kSides = bit(evaluate_transmission) | bit(evaluate_scattering);
 inline constexpr unsigned kQuery = bit(pdf_reflection) | bit(evaluate_reflection) | kSides;
 inline constexpr unsigned kMasking = bit(masking);
-inline constexpr unsigned kEvery = kSample | kQuery | kMasking;
+inline constexpr unsigned kAlbedo = bit(albedo);
+inline constexpr unsigned kEvery = kSample | kQuery | kMasking | kAlbedo;
 inline constexpr unsigned kReflectance = kReflected | bit(evaluate_reflection);
 inline constexpr unsigned kDielectric = kReflectance | kScattered | kSides;
 inline constexpr unsigned kDirection = kReflected | kScattered;
@@ -64,7 +65,9 @@ inline constexpr unsigned kBranch = bit(sample_scattering) | bit(evaluate_scatte
   X(Area, projected_area, kMasking)      \
   X(Share, share_unoccluded, kMasking)   \
   X(Branch, branch_probability, kBranch) \
-  X(EtaScale, eta_scale, kScattered)
+  X(EtaScale, eta_scale, kScattered)     \
+  X(Albedo, albedo, kAlbedo)             \
+  X(MeanAlbedo, mean_albedo, kAlbedo)
 
 #define FACETWISE_BYTE_FIELDS(X) \
   X(Status, status, kEvery)      \

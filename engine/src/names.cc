@@ -28,6 +28,7 @@ constexpr Named<Normalisation> kNormalisations[] = {{Normalisation::unbiased, "u
 constexpr Named<Interface> kInterfaces[] = {
     {Interface::conductor, "conductor"}, {Interface::schlick, "schlick"}, {Interface::dielectric, "dielectric"}};
 constexpr Named<Transport> kTransports[] = {{Transport::radiance, "radiance"}, {Transport::importance, "importance"}};
+constexpr Named<Compensation> kCompensations[] = {{Compensation::none, "none"}, {Compensation::turquin, "turquin"}};
 constexpr Named<Sampler> kSamplers[] = {{Sampler::ndf, "ndf"},     {Sampler::heitz, "heitz"},
                                         {Sampler::cap, "cap"},     {Sampler::bounded, "bounded"},
                                         {Sampler::exact, "exact"}, {Sampler::visible, "visible"}};
@@ -48,7 +49,8 @@ constexpr Named<Operation> kOperations[] = {{Operation::sample_normal, "sample_n
                                             {Operation::sample_transmission, "sample_transmission"},
                                             {Operation::evaluate_transmission, "evaluate_transmission"},
                                             {Operation::sample_scattering, "sample_scattering"},
-                                            {Operation::evaluate_scattering, "evaluate_scattering"}};
+                                            {Operation::evaluate_scattering, "evaluate_scattering"},
+                                            {Operation::albedo, "albedo"}};
 
 template <class T, std::size_t n>
 std::string_view name_in(const Named<T> (&table)[n], T value) {
@@ -72,6 +74,7 @@ std::string_view name(Shadowing value) { return name_in(kShadowings, value); }
 std::string_view name(Normalisation value) { return name_in(kNormalisations, value); }
 std::string_view name(Interface value) { return name_in(kInterfaces, value); }
 std::string_view name(Transport value) { return name_in(kTransports, value); }
+std::string_view name(Compensation value) { return name_in(kCompensations, value); }
 std::string_view name(Sampler value) { return name_in(kSamplers, value); }
 std::string_view name(LaneStatus value) { return name_in(kStatuses, value); }
 std::string_view name(Target value) { return name_in(kTargets, value); }
@@ -83,6 +86,7 @@ std::optional<Shadowing> parse_shadowing(std::string_view text) { return parse_i
 std::optional<Normalisation> parse_normalisation(std::string_view text) { return parse_in(kNormalisations, text); }
 std::optional<Interface> parse_interface(std::string_view text) { return parse_in(kInterfaces, text); }
 std::optional<Transport> parse_transport(std::string_view text) { return parse_in(kTransports, text); }
+std::optional<Compensation> parse_compensation(std::string_view text) { return parse_in(kCompensations, text); }
 std::optional<Sampler> parse_sampler(std::string_view text) { return parse_in(kSamplers, text); }
 std::optional<Target> parse_target(std::string_view text) { return parse_in(kTargets, text); }
 std::optional<Operation> parse_operation(std::string_view text) { return parse_in(kOperations, text); }

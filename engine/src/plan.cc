@@ -76,7 +76,7 @@ bool streams(const Plan& plan, bool spreads, const Execution& execution) {
 }  // namespace
 
 void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
-               bool spreads, const Execution& execution, Plan& plan) {
+               bool spreads, const Execution& execution, const AlbedoTableView* albedo, Plan& plan) {
   const Model& model = batch.model;
   plan.table = &table;
   const bool affine = is_affine(batch);
@@ -125,6 +125,12 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
   // Operations without reflectances do not read its columns.
   if (known_to::kDielectric & bit(operation)) plan.constants.interface = model.interface;
   plan.constants.table = model.table ? &model.table->view() : nullptr;
+  plan.constants.albedo = albedo;
+  if (compensated(operation, batch)) {
+    plan.compensation = find_compensation(table, model, affine);
+    plan.compensated = operation == Operation::sample_reflection ? kOutWeight : kOutValue;
+    plan.buffers = true;
+  }
 
   if (plan.active || plan.positions < kLanesWorthHead) return;
   plan.head = best_head(plan);
@@ -135,7 +141,8 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
   if (!streams(plan, spreads, execution)) return;
   for (std::size_t c = 0; c < plan.out_count; ++c) {
     const auto& [index, column, contiguous] = plan.out[c];
-    if (contiguous && lanes_to_line(column->data()) == plan.head) plan.streamed |= 1u << index;
+    const bool touched_again = plan.compensation != nullptr && index == static_cast<unsigned>(plan.compensated);
+    if (contiguous && !touched_again && lanes_to_line(column->data()) == plan.head) plan.streamed |= 1u << index;
   }
 }
 

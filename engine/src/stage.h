@@ -42,7 +42,9 @@ class Stage {
       if (plan_.generator) generate(begin);
       const bool staged = point_outputs(begin, in_place);
       if (plan_.ahead) point_ahead(begin, in_place);
+      if (plan_.compensation) compute_factors();
       plan_.kernel(tile_, statistics);
+      if (plan_.compensation) apply_factors();
       if (staged) store(begin);
       begin += lanes;
     }
@@ -130,6 +132,17 @@ class Stage {
       if (plan_.out[c].contiguous && !(plan_.streamed & 1u << plan_.out[c].index)) add(plan_.out[c].column->data());
   }
 
+  // Before the kernel runs, whose outputs may lie over its inputs.
+  void compute_factors() {
+    tile_.factor = factor_;
+    Statistics counted_by_the_kernel;
+    plan_.compensation(tile_, counted_by_the_kernel);
+  }
+  void apply_factors() {
+    float* const out = tile_.out[plan_.compensated];
+    for (std::size_t j = 0; j < tile_.lanes; ++j) out[j] = std::min(out[j] * factor_[j], kLargestDensity);
+  }
+
   void store(std::size_t begin) {
     for (std::size_t c = 0; c < plan_.out_count; ++c) {
       const auto& [k, column, contiguous] = plan_.out[c];
@@ -150,6 +163,7 @@ class Stage {
   Tile tile_;
   alignas(64) float in_[kInputs][kStaged];
   alignas(64) float out_[kOutputs][kStaged];
+  alignas(64) float factor_[kStaged];
   alignas(64) std::uint8_t bytes_[kByteOutputs][kStaged];
   alignas(64) std::uint64_t id_[kStaged];
 };

@@ -5,12 +5,16 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "facetwise/albedo_table.h"
 #include "facetwise/batch.h"
 #include "facetwise/slope_table.h"
 #include "facetwise/target.h"
 #include "src/fields.h"
 
 namespace facetwise {
+
+// The largest pdf and value: one can be beyond the floats straight below a smooth surface.
+inline constexpr float kLargestDensity = 3e38f;
 
 // Floats of a cache line.
 inline constexpr std::size_t kLine = 16;
@@ -36,6 +40,7 @@ struct TileConstants {
   bool retro = false;
   Interface interface = Interface::conductor;
   const SlopeTableView* table = nullptr;
+  const AlbedoTableView* albedo = nullptr;  // where it is read
 };
 
 // Pointers that are neither read nor wanted are not set: every call pays for what is.
@@ -47,6 +52,7 @@ struct Tile : TileConstants {
   std::uint8_t* event = nullptr;   // likewise
   const float* in[kInputs];        // those that the operation reads, the optional ones too
   float* out[kOutputs];            // the wanted ones
+  float* factor = nullptr;         // of compensation: what it computes
   std::size_t ahead_count = 0;     // for kernels that fetch ahead: columns, as far ahead as each is fetched
   const float* ahead[std::size_t{kInputs} + kOutputs];
 };
@@ -74,6 +80,8 @@ struct SurfaceKernels {
   Kernel scatter[kSamplers] = {};        // sample_transmission, sample_scattering
   Kernel scatter_query[kSamplers] = {};  // evaluate_transmission, evaluate_scattering
   Kernel masking = nullptr;
+  Kernel albedo = nullptr;
+  Kernel compensation = nullptr;
 };
 
 // Those of a distribution. `affine` serves mean slopes and correlated roughness.
@@ -93,9 +101,11 @@ struct TargetKernels {
 // The kernels of an available target (target.h), full vectors or one lane wide.
 const TargetKernels& kernels(Target target, bool one_lane);
 
-// A batch's kernel, null where the composition has none. `affine`: mean slopes or correlations are given.
-// `ahead`: that which fetches ahead, if there is one.
+// A batch's kernel, null where the composition has none. `affine`: mean slopes or correlations are given; `ahead`: that
+// which fetches ahead, if there is one.
 Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine,
                    bool ahead = false);
+// What computes a model's compensation into Tile::factor.
+Kernel find_compensation(const TargetKernels& table, const Model& model, bool affine);
 
 }  // namespace facetwise

@@ -25,7 +25,9 @@ std::vector<OutputPlace> places_of_outputs(const Fields& fields) {
     const ColumnPlace place = place_of(*v1::BatchResponse::descriptor(), field.name, member);
     std::string output(member.substr(0, member.find('.')));
     for (char& c : output) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    if (output == "MASKING") output = "MASKING_G1";  // MASKING is an operation
+    // These are operations.
+    if (output == "MASKING") output = "MASKING_G1";
+    if (output == "ALBEDO") output = "DIRECTIONAL_ALBEDO";
     OutputPlace& added = places.emplace_back(OutputPlace{place.name, place.field, place.part, v1::OUTPUT_UNSPECIFIED});
     if (!v1::Output_Parse(output, &added.output)) throw std::logic_error("the protocol lacks the output " + output);
   }
@@ -34,7 +36,7 @@ std::vector<OutputPlace> places_of_outputs(const Fields& fields) {
 
 // The protocol's values are the library's plus one: 0 is "unspecified".
 static_assert(v1::SAMPLE_NORMAL == static_cast<int>(Operation::sample_normal) + 1);
-static_assert(v1::EVALUATE_SCATTERING == static_cast<int>(Operation::evaluate_scattering) + 1);
+static_assert(v1::ALBEDO == static_cast<int>(Operation::albedo) + 1);
 static_assert(v1::GGX == static_cast<int>(Distribution::ggx) + 1);
 static_assert(v1::TABLE == static_cast<int>(Distribution::table) + 1);
 static_assert(v1::SMITH == static_cast<int>(Masking::smith) + 1);
@@ -43,6 +45,7 @@ static_assert(v1::UNCORRELATED == static_cast<int>(Shadowing::uncorrelated) + 1)
 static_assert(v1::BIASED == static_cast<int>(Normalisation::biased) + 1);
 static_assert(v1::DIELECTRIC == static_cast<int>(Interface::dielectric) + 1);
 static_assert(v1::IMPORTANCE == static_cast<int>(Transport::importance) + 1);
+static_assert(v1::TURQUIN == static_cast<int>(Compensation::turquin) + 1);
 static_assert(v1::NDF == static_cast<int>(Sampler::ndf) + 1);
 static_assert(v1::VISIBLE == static_cast<int>(Sampler::visible) + 1);
 // Those of a lane are the library's own.
@@ -81,7 +84,7 @@ std::span<const OutputPlace> byte_places() {
   return places;
 }
 
-std::optional<Operation> operation_from(int value) { return from(value, Operation::evaluate_scattering, {}); }
+std::optional<Operation> operation_from(int value) { return from(value, Operation::albedo, {}); }
 std::optional<Distribution> distribution_from(int value) {
   return from(value, Distribution::table, std::optional(Distribution::ggx));
 }
@@ -98,6 +101,9 @@ std::optional<Interface> interface_from(int value) {
 std::optional<Transport> transport_from(int value) {
   return from(value, Transport::importance, std::optional(Transport::radiance));
 }
+std::optional<Compensation> compensation_from(int value) {
+  return from(value, Compensation::turquin, std::optional(Compensation::none));
+}
 std::optional<Sampler> sampler_from(int value, Sampler unspecified) {
   return from(value, Sampler::visible, std::optional(unspecified));
 }
@@ -109,6 +115,7 @@ v1::Shadowing to_proto(Shadowing value) { return to<v1::Shadowing>(value); }
 v1::Normalisation to_proto(Normalisation value) { return to<v1::Normalisation>(value); }
 v1::Interface to_proto(Interface value) { return to<v1::Interface>(value); }
 v1::Transport to_proto(Transport value) { return to<v1::Transport>(value); }
+v1::Compensation to_proto(Compensation value) { return to<v1::Compensation>(value); }
 v1::SamplerKind to_proto(Sampler value) { return to<v1::SamplerKind>(value); }
 
 unsigned outputs_of(Operation operation) {

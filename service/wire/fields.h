@@ -43,6 +43,7 @@ std::optional<Shadowing> shadowing_from(int value);
 std::optional<Normalisation> normalisation_from(int value);
 std::optional<Interface> interface_from(int value);
 std::optional<Transport> transport_from(int value);
+std::optional<Compensation> compensation_from(int value);
 std::optional<Sampler> sampler_from(int value, Sampler unspecified);
 v1::Operation to_proto(Operation value);
 v1::Distribution to_proto(Distribution value);
@@ -51,6 +52,7 @@ v1::Shadowing to_proto(Shadowing value);
 v1::Normalisation to_proto(Normalisation value);
 v1::Interface to_proto(Interface value);
 v1::Transport to_proto(Transport value);
+v1::Compensation to_proto(Compensation value);
 v1::SamplerKind to_proto(Sampler value);
 
 // Bit (1 << Output) for each output that the operation has.

@@ -37,6 +37,7 @@ std::vector<Case> cases() {
        {"mx", "my", "mz", "pdf"}},
       {"pdf", {"pdf", "--sampler", "bounded"}, Operation::pdf_reflection, Sampler::bounded, {"pdf"}},
       {"evaluate", {"evaluate"}, Operation::evaluate_reflection, Sampler::exact, {"pdf", "value"}},
+      {"albedo", {"albedo"}, Operation::albedo, Sampler::visible, {"albedo", "mean_albedo"}},
   };
 }
 
@@ -49,6 +50,8 @@ OutputColumn<float>& output_column(Batch& batch, const std::string& name) {
   if (name == "mz") return batch.out.normal.z;
   if (name == "pdf") return batch.out.pdf;
   if (name == "weight") return batch.out.weight;
+  if (name == "albedo") return batch.out.albedo;
+  if (name == "mean_albedo") return batch.out.mean_albedo;
   return batch.out.value;
 }
 
@@ -171,6 +174,41 @@ TEST(Evaluate, ShadowingIsRead) {
 }
 
 // Where no sampler is named it is one that the columns allow: `exact` of Beckmann takes no mean slopes, GGX's does.
+TEST(Albedo, TablesAreKeptInFiles) {
+  const Directory directory;
+  const std::string rows = "ix,iy,iz\n0,0,1\n0.6,0,0.8\n", table = directory.path("ggx.albedo");
+  const std::vector<std::string> call = {"albedo", "--alpha", "0.5", "--albedo-table", table};
+  const auto first = facetwise(call, rows);
+  ASSERT_EQ(first.code, 0) << first.err;
+  EXPECT_NE(first.err.find("table of albedo: "), std::string::npos) << "it shows its progress: " << first.err;
+  const std::string bytes = read_file(table);
+  const auto second = facetwise(call, rows);
+  ASSERT_EQ(second.code, 0) << second.err;
+  EXPECT_EQ(second.err.find("table of albedo: "), std::string::npos) << second.err;
+  EXPECT_EQ(second.out, first.out);
+  EXPECT_EQ(read_file(table), bytes);
+
+  // A white furnace: weights are 1 / E where nothing is occluded or shadowed.
+  const std::string random = "ix,iy,iz,u1,u2,u3\n0.6,0,0.8,0.5,0.5,0.5\n";
+  const auto compensated =
+      facetwise({"sample", "--alpha", "0.5", "--compensation", "turquin", "--albedo-table", table}, random);
+  ASSERT_EQ(compensated.code, 0) << compensated.err;
+  const auto plain = facetwise({"sample", "--alpha", "0.5"}, random);
+  EXPECT_NE(compensated.out, plain.out);
+
+  const auto fails = [&](std::vector<std::string> arguments, const std::string& says) {
+    const auto result = facetwise(arguments, rows);
+    EXPECT_EQ(result.code, 1);
+    EXPECT_NE(result.err.find(says), std::string::npos) << result.err;
+    EXPECT_EQ(result.out, "");
+  };
+  fails(plus(call, {"--masking", "vcavity"}), "ggx.albedo: a table of ggx with smith masking");
+  fails({"pdf", "--alpha", "0.5", "--albedo-table", table}, "--albedo-table: read by");
+  fails(plus(call, {"--remote", "unix:/nowhere"}), "--albedo-table: a server has its own");
+  write_file(table, bytes.substr(0, 1000));
+  fails(call, "ggx.albedo: truncated");
+}
+
 TEST(Sample, DefaultSamplerFitsTheColumns) {
   const std::string plain = "ix,iy,iz,alpha_x,alpha_y\n0.6,0,0.8,0.3,0.4\n";
   const std::string sloped = "ix,iy,iz,alpha_x,alpha_y,mean_slope_x\n0.6,0,0.8,0.3,0.4,0.1\n";

@@ -27,12 +27,13 @@ TEST(Names, RoundTrip) {
   expect_round_trip({Normalisation::unbiased, Normalisation::biased}, parse_normalisation);
   expect_round_trip({Interface::conductor, Interface::schlick, Interface::dielectric}, parse_interface);
   expect_round_trip({Transport::radiance, Transport::importance}, parse_transport);
+  expect_round_trip({Compensation::none, Compensation::turquin}, parse_compensation);
   expect_round_trip({Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact, Sampler::visible},
                     parse_sampler);
   expect_round_trip({Target::best, Target::scalar, Target::avx2, Target::avx3, Target::neon}, parse_target);
   expect_round_trip({Operation::sample_normal, Operation::sample_reflection, Operation::pdf_reflection,
                      Operation::evaluate_reflection, Operation::masking, Operation::sample_transmission,
-                     Operation::evaluate_transmission, Operation::sample_scattering, Operation::evaluate_scattering},
+                     Operation::evaluate_transmission, Operation::sample_scattering, Operation::evaluate_scattering, Operation::albedo},
                     parse_operation);
   EXPECT_EQ(name(Sampler::cap), "cap");
   EXPECT_EQ(name(LaneStatus::accepted), "accepted");
@@ -62,7 +63,7 @@ TEST(Names, FieldTables) {
     EXPECT_NE(field.operations, 0u);
   }
   EXPECT_EQ(input_fields().size(), 17u);
-  EXPECT_EQ(output_fields().size(), 15u);
+  EXPECT_EQ(output_fields().size(), 17u);
   EXPECT_EQ(byte_fields().size(), 2u);
 }
 

@@ -7,6 +7,8 @@
 #include <limits>
 #include <set>
 
+#include "facetwise/albedo_table.h"
+
 namespace facetwise::test {
 namespace {
 
@@ -68,7 +70,7 @@ float uniform(std::uint64_t seed, std::uint64_t index) {
 bool is_plain(const Call& call) {
   return call.model.distribution == Distribution::ggx && call.model.masking == Masking::smith &&
          call.model.interface == Interface::conductor && call.model.normalisation == Normalisation::unbiased &&
-         !call.model.retro && !call.moments;
+         !call.model.retro && call.model.compensation == Compensation::none && !call.moments;
 }
 
 bool reads(const Call& call, const InputField& field) {
@@ -96,11 +98,13 @@ std::string call_name(const Call& call) {
     append(model.distribution);
     text.append("-").append(name(model.masking));
   }
-  if (call.operation != Operation::masking && !call.values_alone) append(call.sampler);
+  if (call.operation != Operation::masking && call.operation != Operation::albedo && !call.values_alone)
+    append(call.sampler);
   if (call.shadowing == Shadowing::uncorrelated) append(call.shadowing);
   if (model.normalisation != Normalisation::unbiased) append(model.normalisation);
   if (model.interface != Interface::conductor) append(model.interface);
   if (model.transport != Transport::radiance) append(model.transport);
+  if (model.compensation != Compensation::none) append(model.compensation);
   if (model.retro) text += "/retro";
   if (call.moments) text += "/moments";
   return text;
@@ -148,6 +152,7 @@ bool fits(const Call& call) {
 void add_model(const Model& model, bool moments, std::vector<Call>& calls, std::set<std::string>& names) {
   std::size_t turn = calls.size();
   for (const Operation operation : all_operations()) {
+    if (operation == Operation::albedo) continue;  // below
     Model varied = model;
     if (operation >= Operation::sample_transmission) varied.interface = Interface::dielectric;
     const auto add = [&](Sampler sampler, bool values_alone) {
@@ -162,6 +167,30 @@ void add_model(const Model& model, bool moments, std::vector<Call>& calls, std::
   }
 }
 
+// Albedo, and what compensation multiplies.
+void add_compensated(const Model& model, std::vector<Call>& calls) {
+  std::size_t turn = calls.size();
+  calls.push_back(
+      {Operation::albedo, Sampler::visible, turn % 2 ? Shadowing::correlated : Shadowing::uncorrelated, model});
+  for (const Operation operation : {Operation::sample_reflection, Operation::evaluate_reflection}) {
+    Call call{operation, Sampler::visible, ++turn % 2 ? Shadowing::correlated : Shadowing::uncorrelated, model};
+    call.model.interface = turn % 3 ? Interface::schlick : Interface::conductor;
+    call.model.retro = turn % 5 == 0;
+    call.model.compensation = Compensation::turquin;
+    calls.push_back(call);
+  }
+}
+
+// Small tables: quick to build, wherever tests run.
+void keep_small_albedo_tables() {
+  for (Model model : all_models())
+    for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated}) {
+      model.shadowing = shadowing;
+      const auto table = AlbedoTable::build(model, {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4});
+      if (table.ok()) use_albedo_table(*table);
+    }
+}
+
 }  // namespace
 
 std::vector<Call> plain_calls() {
@@ -173,6 +202,7 @@ std::vector<Call> plain_calls() {
 namespace {
 
 std::vector<Call> make_all_calls() {
+  keep_small_albedo_tables();
   std::vector<Call> calls;
   add_plain(calls);
   std::set<std::string> names;
@@ -180,6 +210,7 @@ std::vector<Call> make_all_calls() {
   for (const Model& model : all_models()) add_model(model, false, calls, names);
   for (const Model& model : all_models())
     if (takes_slopes(model)) add_model(model, true, calls, names);
+  for (const Model& model : all_models()) add_compensated(model, calls);
 #ifdef FACETWISE_QUICK
   // For an emulator: all of plain GGX, and of the models every seventh.
   const std::size_t plain = plain_calls().size();

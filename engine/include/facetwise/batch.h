@@ -24,10 +24,15 @@ namespace facetwise {
 //   evaluate_transmission  incident roughness outgoing       value pdf status
 //   sample_scattering      incident roughness random         the same, event branch_probability
 //   evaluate_scattering    incident roughness outgoing       value pdf branch_probability status
+//   albedo                 incident roughness                albedo mean_albedo status
 //
 // "roughness" is alpha and, as far as given, mean_slope and slope_correlation. Operations also read what the
 // model's interface needs: f0, f90 (Schlick) or eta (dielectric). Values and masking are no sampler's: evaluate_* read
-// Batch::sampler where the pdf is wanted, masking never.
+// Batch::sampler where the pdf is wanted, masking and albedo never.
+//
+// albedo is what share of the light from i the surface reflects by one scattering at microfacets with F = 1, whatever
+// the interface (conductor or schlick): what a layer above another leaves to it is about 1 - F albedo. It takes no mean
+// slope; i_z <= 0 is answered as i_z = 0. docs/albedo.md has its errors.
 //
 // With a dielectric, *_reflection and *_transmission force the event: each microfacet reflects, or transmits,
 // whatever its Fresnel reflectance F, which is then part of weight and value only. *_scattering choose between
@@ -44,6 +49,7 @@ enum class Operation : std::uint8_t {
   evaluate_transmission = 6,
   sample_scattering = 7,
   evaluate_scattering = 8,
+  albedo = 9,
 };
 
 std::string_view name(Operation);
@@ -110,6 +116,8 @@ struct Batch {
     OutputColumn<float> branch_probability{};   // of the event that was chosen, or that o means
     OutputColumn<float> eta_scale{};            // 1 for a reflection; for a transmission eta^2 (radiance) or 1: what
                                                 // a path divides its weight by to compare it with others'
+    OutputColumn<float> albedo{};               // E(i)
+    OutputColumn<float> mean_albedo{};          // average of E over the hemisphere, by the cosine
     OutputColumn<std::uint8_t> event{};         // Event
     OutputColumn<std::uint8_t> status{};        // LaneStatus
   } out{};

@@ -49,6 +49,9 @@ inline absl::StatusOr<Statistics> sample_scattering(const Batch& batch, const Ex
 inline absl::StatusOr<Statistics> evaluate_scattering(const Batch& batch, const Execution& execution = {}) {
   return run(Operation::evaluate_scattering, batch, execution);
 }
+inline absl::StatusOr<Statistics> albedo(const Batch& batch, const Execution& execution = {}) {
+  return run(Operation::albedo, batch, execution);
+}
 
 // Compaction of accepted lanes, stable in order: what a wavefront queue keeps after sampling.
 struct Compaction {
@@ -86,6 +89,7 @@ class Engine {
   auto evaluate_transmission(const Batch& batch) { return run(Operation::evaluate_transmission, batch); }
   auto sample_scattering(const Batch& batch) { return run(Operation::sample_scattering, batch); }
   auto evaluate_scattering(const Batch& batch) { return run(Operation::evaluate_scattering, batch); }
+  auto albedo(const Batch& batch) { return run(Operation::albedo, batch); }
 };
 
 std::unique_ptr<Engine> local_engine(const Execution& execution = {});

@@ -59,6 +59,13 @@ enum class Interface : std::uint8_t {
 // What transmission carries: radiance is scaled by 1 / eta^2 on its way, importance is not (Veach 1997, section 5.2).
 enum class Transport : std::uint8_t { radiance = 0, importance = 1 };
 
+// What is added for the light that is scattered more than once between microfacets, which single scattering loses.
+enum class Compensation : std::uint8_t {
+  none = 0,
+  turquin = 1,  // weights and values times 1 + F0 (1 - E(i)) / E(i), E the directional albedo: Turquin 2019. Right in
+                // sum for F0 = 1; not reciprocal. Of reflections by conductors and schlick, without a mean slope
+};
+
 // How directions are drawn. u1, u2, u3 are uniform in [0, 1); phi = 2 pi u2.
 // Stretched incident direction: (alpha_x i_x, alpha_y i_y, i_z) / nu, its z called c.
 //
@@ -83,6 +90,7 @@ struct Model {
   Normalisation normalisation = Normalisation::unbiased;
   Interface interface = Interface::conductor;
   Transport transport = Transport::radiance;
+  Compensation compensation = Compensation::none;
   // Retro-reflection by the back-vector (Raab 2025): reflects as if i were (-i_x, -i_y, i_z). The normals and i.m
   // returned are those of the turned i. What a dielectric transmits is not turned.
   bool retro = false;
@@ -123,6 +131,7 @@ std::string_view name(Shadowing);
 std::string_view name(Normalisation);
 std::string_view name(Interface);
 std::string_view name(Transport);
+std::string_view name(Compensation);
 std::string_view name(Sampler);
 std::string_view name(LaneStatus);
 std::optional<Distribution> parse_distribution(std::string_view);
@@ -131,6 +140,7 @@ std::optional<Shadowing> parse_shadowing(std::string_view);
 std::optional<Normalisation> parse_normalisation(std::string_view);
 std::optional<Interface> parse_interface(std::string_view);
 std::optional<Transport> parse_transport(std::string_view);
+std::optional<Compensation> parse_compensation(std::string_view);
 std::optional<Sampler> parse_sampler(std::string_view);
 
 // All samplers, in the enumeration's order.

@@ -7,6 +7,7 @@
 #define FACETWISE_REGISTER_INL_H_
 #endif
 
+#include "src/kernels/albedo-inl.h"
 #include "src/kernels/query-inl.h"
 #include "src/kernels/sample-inl.h"
 #include "src/kernels/scatter-inl.h"
@@ -22,7 +23,11 @@ template <class S, class D, class Pairs = D>
 struct Registrar {
   SurfaceKernels kernels{};
 
-  constexpr Registrar() { kernels.masking = ForEachVector<D, MaskingOf<D, S>>; }
+  constexpr Registrar() {
+    kernels.masking = ForEachVector<D, MaskingOf<D, S>>;
+    kernels.albedo = ForEachVector<D, AlbedoOf<D, S>>;
+    kernels.compensation = ForEachVector<D, CompensationOf<D, S>>;
+  }
   template <class Drawer>
   constexpr Registrar& Add(Sampler sampler) {
     const auto index = static_cast<std::size_t>(sampler);

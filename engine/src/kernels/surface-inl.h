@@ -26,7 +26,6 @@ namespace HWY_NAMESPACE {
 
 inline constexpr float kPi = 3.14159265358979f;
 inline constexpr float kLengthTolerance = 1e-3f;  // of |v|^2 of a direction
-inline constexpr float kLargestDensity = 3e38f;   // one can be beyond the floats straight below a smooth surface
 inline constexpr float kLargestBelowOne = 1 - 0x1p-24f;
 inline constexpr float kTiny = 0x1p-60f;     // stands for a cosine or a share of 0 in quotients
 inline constexpr float kHorizon = 0x1p-30f;  // stands for a cosine of 0 where it is squared

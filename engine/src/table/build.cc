@@ -10,6 +10,7 @@
 #include "facetwise/slope_table.h"
 #include "src/float_environment.h"
 #include "src/table/layout.h"
+#include "src/work.h"
 #include "tbb/parallel_for.h"
 #include "tbb/task_arena.h"
 
@@ -107,31 +108,6 @@ double integral(const SlopeTableView& view) {
         }
   return sum * 4 / cells / cells;
 }
-
-// Runs bodies in parallel and tells how far they are.
-class Work {
- public:
-  Work(const std::function<void(double)>& progress, double total) : progress_(progress), total_(total) {}
-
-  template <class Body>
-  void each(std::size_t n, double cost, const Body& body) {
-    tbb::parallel_for(std::size_t{0}, n, [&](std::size_t k) {
-      const FloatEnvironment environment;
-      body(k);
-      if (!progress_) return;
-      const std::lock_guard lock(mutex_);
-      done_ += cost;
-      if (done_ < told_ + total_ / 100) return;
-      told_ = done_;
-      progress_(std::min(done_ / total_, 1.0));
-    });
-  }
-
- private:
-  const std::function<void(double)>& progress_;
-  std::mutex mutex_;
-  double total_, done_ = 0, told_ = 0;
-};
 
 // Where the integral of a density, linear between equidistant values on [0, 1], reaches the nodes in u.
 // False, and nothing done, if it is 0.

@@ -2,19 +2,16 @@
 //
 // The bytes: 8 of magic, the version and the six sizes of TableSizes as uint32, 4 bytes of 0, the values as
 // float32, and the FNV-1a hash of all before as uint64; little-endian.
-#include <unistd.h>
-
 #include <bit>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/slope_table.h"
 #include "src/table/layout.h"
+#include "src/whole_file.h"
 
 namespace facetwise {
 namespace {
@@ -37,10 +34,6 @@ absl::Status invalid(const Parts&... parts) {
   return absl::InvalidArgumentError(absl::StrCat(parts...));
 }
 
-absl::Status of_file(const std::string& path, const absl::Status& status) {
-  return absl::Status(status.code(), absl::StrCat(path, ": ", status.message()));
-}
-
 // What builders make: kernels need no more than sizes in order, but a sample needs rows that rise.
 absl::Status check_values(const TableSizes& sizes, std::span<const float> values) {
   for (std::size_t k = 0; k < sizes.density() + sizes.area(); ++k)
@@ -54,19 +47,6 @@ absl::Status check_values(const TableSizes& sizes, std::span<const float> values
     if (!rises) return invalid("a row of samples does not rise; rebuild it");
   }
   return absl::OkStatus();
-}
-
-absl::StatusOr<std::string> read_file(const std::string& path) {
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) return absl::NotFoundError(absl::StrCat(path, ": cannot open: ", std::strerror(errno)));
-  std::string bytes;
-  char block[1 << 16];
-  for (std::size_t n; (n = std::fread(block, 1, sizeof block, file)) > 0;) bytes.append(block, n);
-  const bool failed = std::ferror(file) != 0;
-  const int error = errno;
-  std::fclose(file);
-  if (failed) return invalid(path, ": cannot read: ", std::strerror(error));
-  return bytes;
 }
 
 // The next word of a text, empty at the end.
@@ -143,21 +123,7 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::parse(std::string_
   return SlopeTableMaker::make(header.sizes, std::move(values));
 }
 
-absl::Status SlopeTable::save(const std::string& path) const {
-  // Beside its place, then renamed: a reader never sees half a table.
-  std::string temporary = absl::StrCat(path, ".XXXXXX");
-  const int descriptor = ::mkstemp(temporary.data());
-  if (descriptor < 0) return invalid(path, ": cannot create: ", std::strerror(errno));
-  ::close(descriptor);
-  std::FILE* file = std::fopen(temporary.c_str(), "wb");
-  const std::string bytes = serialise();
-  bool written = file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-  if (file != nullptr) written = std::fclose(file) == 0 && written;
-  if (written && std::rename(temporary.c_str(), path.c_str()) == 0) return absl::OkStatus();
-  const int error = errno;
-  ::unlink(temporary.c_str());
-  return invalid(path, ": cannot write: ", std::strerror(error));
-}
+absl::Status SlopeTable::save(const std::string& path) const { return replace_file(path, serialise()); }
 
 absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::load(const std::string& path) {
   const auto bytes = read_file(path);

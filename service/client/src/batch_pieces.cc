@@ -68,6 +68,7 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
   model.set_interface(wire::to_proto(batch.model.interface));
   model.set_transport(wire::to_proto(batch.model.transport));
   model.set_retro(batch.model.retro);
+  model.set_compensation(wire::to_proto(batch.model.compensation));
   small.set_sampler(wire::to_proto(batch.sampler));
   small.set_lanes(range.size());
   for (int output = v1::Output_MIN; output <= v1::Output_MAX; ++output)

@@ -62,7 +62,8 @@ class Decoder {
   std::size_t at_ = 0;
 
   int operation_value_ = 0, sampler_ = 0;
-  int distribution_ = 0, masking_ = 0, shadowing_ = 0, normalisation_ = 0, interface_ = 0, transport_ = 0;
+  int distribution_ = 0, masking_ = 0, shadowing_ = 0, normalisation_ = 0, interface_ = 0, transport_ = 0,
+      compensation_ = 0;
   bool retro_ = false;
   std::optional<Operation> operation_;
   std::uint64_t lanes_ = 0;
@@ -133,6 +134,7 @@ absl::Status Decoder::read_model(std::size_t bytes) {
       case v1::Model::kNormalisationFieldNumber: return read_enum(field, normalisation_);
       case v1::Model::kInterfaceFieldNumber: return read_enum(field, interface_);
       case v1::Model::kTransportFieldNumber: return read_enum(field, transport_);
+      case v1::Model::kCompensationFieldNumber: return read_enum(field, compensation_);
       case v1::Model::kRetroFieldNumber: {
         std::uint64_t value = 0;
         const bool good = reader_.varint(field, value);
@@ -236,18 +238,21 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
   const auto normalisation = wire::normalisation_from(normalisation_);
   const auto interface = wire::interface_from(interface_);
   const auto transport = wire::transport_from(transport_);
+  const auto compensation = wire::compensation_from(compensation_);
   if (!distribution) return unknown("model.distribution", distribution_);
   if (!masking) return unknown("model.masking", masking_);
   if (!shadowing) return unknown("model.shadowing", shadowing_);
   if (!normalisation) return unknown("model.normalisation", normalisation_);
   if (!interface) return unknown("model.interface", interface_);
   if (!transport) return unknown("model.transport", transport_);
+  if (!compensation) return unknown("model.compensation", compensation_);
   batch.model = {.distribution = *distribution,
                  .masking = *masking,
                  .shadowing = *shadowing,
                  .normalisation = *normalisation,
                  .interface = *interface,
                  .transport = *transport,
+                 .compensation = *compensation,
                  .retro = retro_};
   // Until the columns are there, which decide what an unspecified one means.
   if (!wire::sampler_from(sampler_, Sampler::visible)) return unknown("sampler", sampler_);

@@ -1,0 +1,178 @@
+// Tables of albedo as bytes and files, and those that the process keeps.
+//
+// The bytes: 8 of magic, the version, distribution, masking and shadowing as uint32, the id of the table of slopes as
+// uint64, the six sizes as uint32, the values as float32, and the FNV-1a hash of all before as uint64; little-endian.
+#include "facetwise/albedo_table.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+
+#include "absl/strings/str_cat.h"
+#include "facetwise/slope_table.h"
+#include "src/albedo/layout.h"
+#include "src/table/layout.h"
+#include "src/whole_file.h"
+#include "tbb/task_arena.h"
+
+namespace facetwise {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "values are written as they lie in memory");
+
+constexpr char kMagic[] = {'f', 'w', 'a', 'l', 'b', 'e', 'd', '\x1a'};
+constexpr std::uint32_t kVersion = 1;
+struct Header {
+  char magic[8];
+  std::uint32_t version, distribution, masking, shadowing;
+  std::uint64_t slopes;
+  AlbedoSizes sizes;
+};
+static_assert(sizeof(Header) == 56 && sizeof(AlbedoSizes) == 24);
+
+template <class... Parts>
+absl::Status invalid(const Parts&... parts) {
+  return absl::InvalidArgumentError(absl::StrCat(parts...));
+}
+
+// A model's table, built by the first who asks.
+struct Kept {
+  std::mutex mutex;
+  std::shared_ptr<const AlbedoTable> table;
+};
+class KeptTables {
+ public:
+  Kept& of(const AlbedoTable::Key& key) {
+    const std::lock_guard lock(mutex_);
+    for (auto& [at, kept] : all_)
+      if (at == key) return *kept;
+    return *all_.emplace_back(key, std::make_unique<Kept>()).second;
+  }
+  static KeptTables& instance() {
+    static KeptTables tables;
+    return tables;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::pair<AlbedoTable::Key, std::unique_ptr<Kept>>> all_;
+};
+
+}  // namespace
+
+absl::Status check_sizes(const AlbedoSizes& sizes) {
+  for (const std::uint32_t size : {sizes.v, sizes.a, sizes.ratio_v, sizes.ratio_a, sizes.ratio_r, sizes.ratio_t})
+    if (size < 2 || size > 1025) return invalid("sizes: ", size, " nodes, not 2 to 1025");
+  // Kernels address nodes by 32 bits.
+  if (sizes.total() > std::size_t{1} << 28) return invalid("sizes: ", sizes.total(), " nodes, more than 2^28");
+  return absl::OkStatus();
+}
+
+std::shared_ptr<const AlbedoTable> AlbedoTableMaker::make(const AlbedoSizes& sizes, const AlbedoTable::Key& key,
+                                                          std::vector<float> values) {
+  std::shared_ptr<AlbedoTable> table(new AlbedoTable);
+  table->values_ = std::move(values);
+  table->key_ = key;
+  AlbedoTableView& view = table->view_;
+  view.isotropic = table->values_.data();
+  view.ratio = view.isotropic + sizes.isotropic();
+  view.mean = view.ratio + sizes.ratio();
+  view.sizes = sizes;
+  view.inverse_range = static_cast<float>(1 / albedo_range(key.distribution));
+  return table;
+}
+
+AlbedoTable::Key AlbedoTable::key_of(const Model& model) {
+  return {model.distribution, model.masking,
+          // V-cavity has no other.
+          model.masking == Masking::smith ? model.shadowing : Shadowing::correlated,
+          model.table != nullptr ? model.table->id() : 0};
+}
+
+bool AlbedoTable::fits(const Model& model) const { return key_ == key_of(model); }
+
+std::string AlbedoTable::description() const {
+  const auto text = [](auto value) { return absl::string_view(name(value).data(), name(value).size()); };
+  std::string description = absl::StrCat(text(key_.distribution), " with ", text(key_.masking), " masking");
+  if (key_.masking == Masking::smith) absl::StrAppend(&description, ", ", text(key_.shadowing), " shadowing");
+  return description;
+}
+
+std::string AlbedoTable::serialise() const {
+  Header header{{},
+                kVersion,
+                static_cast<std::uint32_t>(key_.distribution),
+                static_cast<std::uint32_t>(key_.masking),
+                static_cast<std::uint32_t>(key_.shadowing),
+                key_.slopes,
+                view_.sizes};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  std::string bytes(reinterpret_cast<const char*>(&header), sizeof header);
+  bytes.append(reinterpret_cast<const char*>(values_.data()), values_.size() * sizeof(float));
+  const std::uint64_t hash = fnv1a(bytes.data(), bytes.size());
+  bytes.append(reinterpret_cast<const char*>(&hash), sizeof hash);
+  return bytes;
+}
+
+absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::parse(std::string_view bytes) {
+  Header header;
+  std::uint64_t hash;
+  if (bytes.size() < sizeof kMagic || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
+    return invalid("not a table of albedo; make one with AlbedoTable::save");
+  if (bytes.size() < sizeof header + sizeof hash)
+    return invalid("truncated: ", bytes.size(), " bytes; copy it again or rebuild it");
+  std::memcpy(&header, bytes.data(), sizeof header);
+  if (header.version != kVersion)
+    return invalid("version ", header.version, "; this facetwise reads version ", kVersion, ": rebuild the table");
+  if (auto status = check_sizes(header.sizes); !status.ok())
+    return invalid("corrupted (", status.message(), "); copy it again or rebuild it");
+  const std::size_t size = sizeof header + header.sizes.total() * sizeof(float) + sizeof hash;
+  if (bytes.size() != size)
+    return invalid(bytes.size() < size ? "truncated: " : "corrupted: ", bytes.size(), " bytes instead of ", size,
+                   "; copy it again or rebuild it");
+  std::memcpy(&hash, bytes.data() + size - sizeof hash, sizeof hash);
+  if (hash != fnv1a(bytes.data(), size - sizeof hash) ||
+      header.distribution > static_cast<std::uint32_t>(Distribution::table) ||
+      header.masking > static_cast<std::uint32_t>(Masking::vcavity) ||
+      header.shadowing > static_cast<std::uint32_t>(Shadowing::uncorrelated))
+    return invalid("corrupted: its hash is another; copy it again or rebuild it");
+  std::vector<float> values(header.sizes.total());
+  std::memcpy(values.data(), bytes.data() + sizeof header, values.size() * sizeof(float));
+  for (const float value : values)
+    if (!(value > 0 && value < 1000)) return invalid("an albedo of ", value, "; rebuild it");
+  return AlbedoTableMaker::make(header.sizes,
+                                {static_cast<Distribution>(header.distribution), static_cast<Masking>(header.masking),
+                                 static_cast<Shadowing>(header.shadowing), header.slopes},
+                                std::move(values));
+}
+
+absl::Status AlbedoTable::save(const std::string& path) const { return replace_file(path, serialise()); }
+
+absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::load(const std::string& path) {
+  const auto bytes = read_file(path);
+  if (!bytes.ok()) return bytes.status();
+  auto table = parse(*bytes);
+  if (!table.ok()) return of_file(path, table.status());
+  return table;
+}
+
+absl::StatusOr<std::shared_ptr<const AlbedoTable>> albedo_table(const Model& model,
+                                                                const std::function<void(double)>& progress) {
+  Kept& kept = KeptTables::instance().of(AlbedoTable::key_of(model));
+  const std::lock_guard lock(kept.mutex);
+  if (kept.table != nullptr) return kept.table;
+  absl::StatusOr<std::shared_ptr<const AlbedoTable>> built;
+  // Isolated: a task of the caller's that this thread took up meanwhile might ask for the same table.
+  tbb::this_task_arena::isolate([&] { built = AlbedoTable::build(model, {.progress = progress}); });
+  if (built.ok()) kept.table = *built;
+  return built;
+}
+
+void use_albedo_table(std::shared_ptr<const AlbedoTable> table) {
+  Kept& kept = KeptTables::instance().of(table->key());
+  const std::lock_guard lock(kept.mutex);
+  kept.table = std::move(table);
+}
+
+}  // namespace facetwise

@@ -1,0 +1,386 @@
+// Directional albedo and compensation: against the reference's quadrature, a furnace, and Turquin's formula.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <random>
+#include <span>
+
+#include "facetwise/albedo_table.h"
+#include "facetwise/slope_table.h"
+#include "models/compositions.h"
+#include "support/counts.h"
+
+namespace facetwise::test {
+namespace {
+
+using reference::Vector;
+
+AlbedoTable::Options small() { return {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4}; }
+
+void use_table(const Model& model, const AlbedoTable::Options& options) {
+  const auto table = AlbedoTable::build(model, options);
+  ASSERT_TRUE(table.ok()) << table.status();
+  use_albedo_table(*table);
+}
+
+struct Places {
+  std::vector<float> x, y, z, alpha_x, alpha_y;
+  std::size_t size() const { return x.size(); }
+  Vector i(std::size_t n) const { return {x[n], y[n], z[n]}; }
+  Batch batch(const Model& model) const {
+    Batch batch;
+    batch.model = model;
+    batch.lanes = size();
+    batch.incident = {x, y, z};
+    batch.alpha_x = alpha_x;
+    batch.alpha_y = alpha_y;
+    return batch;
+  }
+  std::string describe(std::size_t n) const {
+    return "i " + std::to_string(x[n]) + " " + std::to_string(y[n]) + " " + std::to_string(z[n]) + ", alpha " +
+           std::to_string(alpha_x[n]) + " " + std::to_string(alpha_y[n]);
+  }
+};
+
+float largest_alpha(const Model& model) {
+  return model.distribution == Distribution::phong ? kLargestPhongAlpha : kLargestAlpha;
+}
+
+// Directions in front, half of them near the horizon; roughness over all that is allowed.
+Places places(const Model& model, std::size_t count, bool isotropic, std::uint64_t seed, double least_z,
+              float least_alpha, float largest = kLargestAlpha) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  const auto alpha = [&] {
+    const double least = std::log(least_alpha), most = std::log(std::min(largest, largest_alpha(model)));
+    return uniform() < 0.5 ? static_cast<float>(std::exp(least + (most - least) * uniform()))
+                           : static_cast<float>(std::exp(most) * std::max<double>(uniform(), least_alpha));
+  };
+  Places places;
+  for (std::size_t n = 0; n < count; ++n) {
+    const double z = std::max(n % 2 == 0 ? uniform() : std::pow(uniform(), 4), least_z);
+    const double phi = 2 * std::numbers::pi * uniform(), r = std::sqrt((1 - z) * (1 + z));
+    places.x.push_back(static_cast<float>(r * std::cos(phi)));
+    places.y.push_back(static_cast<float>(r * std::sin(phi)));
+    places.z.push_back(static_cast<float>(z));
+    places.alpha_x.push_back(alpha());
+    places.alpha_y.push_back(isotropic ? places.alpha_x.back() : alpha());
+  }
+  return places;
+}
+
+std::vector<float> albedos(const Model& model, const Places& at) {
+  std::vector<float> albedo(at.size());
+  Batch batch = at.batch(model);
+  batch.out.albedo = albedo;
+  const auto statistics = facetwise::albedo(batch);
+  EXPECT_TRUE(statistics.ok()) << statistics.status();
+  return albedo;
+}
+
+// Of samples at one place.
+struct Mean {
+  double value, deviation;
+};
+Mean mean_weight(const Model& model, const Places& at, std::size_t n, std::span<float> weight) {
+  Batch batch;
+  batch.model = model;
+  batch.sampler = default_sampler(Operation::sample_reflection, batch);
+  batch.lanes = weight.size();
+  batch.incident = {at.x[n], at.y[n], at.z[n]};
+  batch.alpha_x = at.alpha_x[n];
+  batch.alpha_y = at.alpha_y[n];
+  batch.generator = {.seed = n};
+  batch.out.weight = weight;
+  const auto statistics = sample_reflection(batch);
+  EXPECT_TRUE(statistics.ok()) << statistics.status();
+  double sum = 0, squares = 0;
+  for (const float w : weight) sum += w, squares += static_cast<double>(w) * w;
+  const double count = static_cast<double>(weight.size()), mean = sum / count;
+  return {mean, std::sqrt(std::max(0.0, squares / count - mean * mean) / count)};
+}
+
+class Albedo : public testing::TestWithParam<Family> {
+ protected:
+  std::vector<Model> models() const {
+    Model model = plain(GetParam(), Sampler::visible).model;
+    std::vector<Model> all = {model};
+    model.shadowing = Shadowing::uncorrelated;
+    if (model.masking == Masking::smith) all.push_back(model);
+    return all;
+  }
+};
+
+// What a table may be wrong by: stated in docs/albedo.md.
+double tolerance(const Places& at, std::size_t n) {
+  if (at.alpha_x[n] == at.alpha_y[n]) return kQuick ? 0.05 : 1e-3;
+  return kQuick ? 0.2 : std::max(at.alpha_x[n], at.alpha_y[n]) <= 4 ? 5e-3 : 0.016;
+}
+
+void expect_the_references(const Model& model) {
+  for (const bool isotropic : {true, false}) {
+    // Closer to the horizon and to a mirror the reference's quadrature takes minutes a point, and may fail.
+    const Places at = places(model, kQuick ? 4 : 24, isotropic, isotropic ? 1 : 2, 1e-3, 1e-2f);
+    const std::vector<float> got = albedos(model, at);
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      const reference::Surface surface{.model = model, .alpha = {at.alpha_x[n], at.alpha_y[n]}};
+      EXPECT_NEAR(got[n], reference::albedo(surface, at.i(n)), tolerance(at, n)) << at.describe(n);
+    }
+  }
+}
+
+// Everywhere: the mean weight of other samples than those that made the table.
+void expect_the_mean_weight(const Model& model) {
+  constexpr std::size_t kSamples = kQuick ? 1 << 10 : 1 << 16;
+  std::vector<float> weight(kSamples);
+  for (const bool isotropic : {true, false}) {
+    const Places at = places(model, kQuick ? 40 : 400, isotropic, isotropic ? 3 : 4, 1e-6, kSmallestAlpha);
+    const std::vector<float> got = albedos(model, at);
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      const Mean mean = mean_weight(model, at, n, weight);
+      EXPECT_NEAR(got[n], mean.value, tolerance(at, n) + 5 * mean.deviation) << at.describe(n);
+    }
+  }
+}
+
+// The average over the hemisphere is that of the albedo, by Gauss's rule in z^2 and equal steps of azimuth.
+void expect_the_hemispheres_mean(const Model& model) {
+  constexpr int kNodes = 64, kTurns = 16;
+  for (const auto& [x, y] : {std::pair{0.1f, 0.1f}, {0.7f, 0.7f}, {1.0f, 0.2f}, {0.05f, 0.9f}}) {
+    Places at;
+    for (int j = 0; j < kNodes; ++j)
+      for (int k = 0; k < kTurns; ++k) {
+        const double squared = (j + 0.5) / kNodes, r = std::sqrt(1 - squared);
+        const double phi = 2 * std::numbers::pi * (k + 0.5) / kTurns;
+        at.x.push_back(static_cast<float>(r * std::cos(phi)));
+        at.y.push_back(static_cast<float>(r * std::sin(phi)));
+        at.z.push_back(static_cast<float>(std::sqrt(squared)));
+        at.alpha_x.push_back(x);
+        at.alpha_y.push_back(y);
+      }
+    double sum = 0;
+    for (const float albedo : albedos(model, at)) sum += albedo;
+    float mean = 0;
+    Batch batch;
+    batch.model = model;
+    batch.lanes = 1;
+    batch.incident = {0.0f, 0.0f, 1.0f};
+    batch.alpha_x = x;
+    batch.alpha_y = y;
+    batch.out.mean_albedo = {&mean, 1};
+    ASSERT_TRUE(facetwise::albedo(batch).ok());
+    EXPECT_NEAR(mean, sum / static_cast<double>(at.size()), kQuick ? 0.05 : x == y ? 2e-3 : 4e-3) << x << ", " << y;
+  }
+}
+
+// A furnace of reflectance 1: all light comes back, in the mean over samples.
+void expect_a_white_furnace(Model model) {
+  if (kQuick) return;  // it measures the table
+  std::vector<float> weight(1 << 17);
+  model.compensation = Compensation::turquin;
+  const Places at = places(model, 60, true, 90, 1e-6, kSmallestAlpha, 4);
+  for (std::size_t n = 0; n < at.size(); ++n) {
+    const Mean mean = mean_weight(model, at, n, weight);
+    EXPECT_NEAR(mean.value, 1, (at.alpha_x[n] <= 1 ? 0.005 : 0.02) + 5 * mean.deviation) << at.describe(n);
+  }
+}
+
+// By the tables that calls use; in an emulator by smaller ones, so that all but their errors is proved there too. In one test,
+// since a table takes seconds.
+TEST_P(Albedo, IsThatOfTheModel) {
+  for (const Model& model : models()) {
+    AlbedoTable::Options options;  // what calls use
+    if (kQuick) options = {.sizes = {33, 17, 9, 9, 5, 5}, .samples = 16};
+    use_table(model, options);
+    expect_the_references(model);
+    expect_the_mean_weight(model);
+    expect_the_hemispheres_mean(model);
+    expect_a_white_furnace(model);
+  }
+}
+
+// Weights and values are those without it times 1 + F0 (1 - E) / E; behind, and of smooth lanes, as they are.
+TEST_P(Albedo, CompensationIsTurquins) {
+  for (const Model& model : models()) {
+    use_table(model, small());
+    for (const Interface interface : {Interface::conductor, Interface::schlick})
+      for (const Operation operation : {Operation::sample_reflection, Operation::evaluate_reflection}) {
+        Composition with = plain(GetParam(), Sampler::visible), without;
+        with.model = model;
+        with.model.interface = interface;
+        without = with;
+        with.model.compensation = Compensation::turquin;
+        std::vector<Point> points = hard_points(with, kQuick ? 512 : 4096, 7);
+        points[3].alpha_x = 0;
+        const auto got = run_points(operation, with, points), before = run_points(operation, without, points);
+        Places at;
+        for (const Point& p : points) {
+          at.x.push_back(p.ix), at.y.push_back(p.iy), at.z.push_back(p.iz);
+          at.alpha_x.push_back(p.alpha_x), at.alpha_y.push_back(p.alpha_y);
+        }
+        const std::vector<float> albedo = albedos(model, at);
+        for (std::size_t n = 0; n < points.size(); ++n) {
+          const double f0 = interface == Interface::schlick ? points[n].f0 : 1;
+          const bool plain_lane = points[n].iz <= 0 || n == 3;
+          const double factor = plain_lane ? 1 : 1 + f0 * (1 - double{albedo[n]}) / albedo[n];
+          const auto compensated = [&](float value) { return std::min(value * factor, 3e38); };
+          EXPECT_NEAR(got[n].weight, compensated(before[n].weight), 3e-6 * compensated(before[n].weight))
+              << describe(points[n]);
+          EXPECT_NEAR(got[n].value, compensated(before[n].value), 3e-6 * compensated(before[n].value))
+              << describe(points[n]);
+          EXPECT_EQ(got[n].pdf, before[n].pdf);
+          EXPECT_EQ(got[n].status, before[n].status);
+        }
+      }
+  }
+}
+
+TEST_P(Albedo, PolicyForLanes) {
+  const Model model = models().front();
+  use_table(model, small());
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Places at;
+  const auto add = [&](float x, float y, float z, float alpha_x, float alpha_y) {
+    at.x.push_back(x), at.y.push_back(y), at.z.push_back(z), at.alpha_x.push_back(alpha_x),
+        at.alpha_y.push_back(alpha_y);
+  };
+  add(0.6f, 0, 0.8f, 0, 0.5f);      // smooth
+  add(0.6f, 0, -0.8f, 0.5f, 0.5f);  // behind, as at the horizon
+  add(1, 0, 0, 0.5f, 0.5f);
+  add(0.6f, 0, 0.8f, -1, 0.5f);  // invalid
+  add(nan, 0, 0.8f, 0.5f, 0.5f);
+  add(0, 0, 1, 0.5f, 0.5f);
+  std::vector<float> albedo(at.size()), mean(at.size());
+  std::vector<std::uint8_t> status(at.size());
+  Batch batch = at.batch(model);
+  batch.out.albedo = albedo;
+  batch.out.mean_albedo = mean;
+  batch.out.status = status;
+  const auto statistics = facetwise::albedo(batch);
+  ASSERT_TRUE(statistics.ok()) << statistics.status();
+  EXPECT_EQ(*statistics, (Statistics{.accepted = 3, .smooth = 1, .invalid = 2}));
+  EXPECT_EQ(albedo[0], 1);
+  EXPECT_EQ(mean[0], 1);
+  EXPECT_EQ(albedo[1], albedo[2]);
+  EXPECT_EQ(albedo[3], 0);
+  EXPECT_EQ(albedo[4], 0);
+  EXPECT_GT(albedo[5], 0.5f);
+  EXPECT_LE(albedo[5], 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Families, Albedo, testing::ValuesIn([] {
+                           std::vector<Family> all;
+                           for (const Family& family : families())
+                             if (!family.affine) all.push_back(family);
+                           return all;
+                         }()),
+                         [](const auto& info) { return name(info.param); });
+
+// Of correlated roughness: that of its principal axes.
+TEST(AlbedoTables, CorrelatedRoughness) {
+  const Model model;
+  use_table(model, small());
+  // Covariance [[a^2, rho a^2], [rho a^2, a^2]] has the axes (1, 1) and (1, -1).
+  constexpr float kAlpha = 0.4f, kRho = 0.5f;
+  float turned = 0, straight = 0;
+  Batch batch;
+  batch.lanes = 1;
+  batch.incident = {0.6f, 0.0f, 0.8f};
+  batch.alpha_x = batch.alpha_y = kAlpha;
+  batch.slope_correlation = kRho;
+  batch.out.albedo = {&turned, 1};
+  ASSERT_TRUE(facetwise::albedo(batch).ok());
+  batch.slope_correlation = {};
+  const float along = 0.6f / std::numbers::sqrt2_v<float>;
+  batch.incident = {along, along, 0.8f};
+  batch.alpha_x = kAlpha * std::sqrt(1 + kRho);
+  batch.alpha_y = kAlpha * std::sqrt(1 - kRho);
+  batch.out.albedo = {&straight, 1};
+  ASSERT_TRUE(facetwise::albedo(batch).ok());
+  EXPECT_NEAR(turned, straight, 1e-5);
+}
+
+TEST(AlbedoTables, FilesKeepThem) {
+  Model model{.distribution = Distribution::beckmann, .shadowing = Shadowing::uncorrelated};
+  double told = 0;
+  AlbedoTable::Options options = small();
+  options.progress = [&](double done) {
+    EXPECT_GE(done, told);
+    told = done;
+  };
+  const auto table = AlbedoTable::build(model, options);
+  ASSERT_TRUE(table.ok()) << table.status();
+  EXPECT_GE(told, 0.98);
+  EXPECT_TRUE((*table)->fits(model));
+  EXPECT_EQ((*table)->description(), "beckmann with smith masking, uncorrelated shadowing");
+  model.shadowing = Shadowing::correlated;
+  EXPECT_FALSE((*table)->fits(model));
+
+  const std::string path = std::filesystem::temp_directory_path() / "facetwise_albedo_test.table";
+  ASSERT_TRUE((*table)->save(path).ok());
+  const auto read = AlbedoTable::load(path);
+  std::filesystem::remove(path);
+  ASSERT_TRUE(read.ok()) << read.status();
+  const std::string bytes = (*table)->serialise();
+  EXPECT_EQ((*read)->serialise(), bytes);
+  EXPECT_EQ((*read)->key(), (*table)->key());
+
+  EXPECT_EQ(AlbedoTable::load("/nowhere/table").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_FALSE(AlbedoTable::parse("").ok());
+  EXPECT_FALSE(AlbedoTable::parse(bytes.substr(0, bytes.size() - 1)).ok());
+  EXPECT_FALSE(AlbedoTable::parse(bytes + "x").ok());
+  for (std::size_t k = 0; k < bytes.size(); k += k < 64 ? 1 : 97) {
+    std::string spoilt = bytes;
+    spoilt[k] = static_cast<char>(spoilt[k] ^ 0x41);
+    EXPECT_FALSE(AlbedoTable::parse(spoilt).ok()) << "byte " << k;
+  }
+}
+
+TEST(AlbedoTables, OfATableOfSlopes) {
+  const auto density = [](double x, double y) { return std::exp(-x * x - y * y); };
+  const auto slopes =
+      SlopeTable::build(density, {.radial = true, .grid = 129, .incidence = 33, .slopes = 33, .uniforms = 64});
+  ASSERT_TRUE(slopes.ok()) << slopes.status();
+  const Model tabulated{.distribution = Distribution::table, .table = *slopes},
+      beckmann{.distribution = Distribution::beckmann};
+  const auto a = AlbedoTable::build(tabulated, small()), b = AlbedoTable::build(beckmann, small());
+  ASSERT_TRUE(a.ok()) << a.status();
+  ASSERT_TRUE(b.ok()) << b.status();
+  EXPECT_NE((*a)->key(), (*b)->key());
+  // The same density: the same albedo, but for what the table rounds and other samples.
+  for (std::size_t k = 0; k < small().sizes.isotropic(); ++k)
+    EXPECT_NEAR((*a)->view().isotropic[k], (*b)->view().isotropic[k], 0.03) << k;
+}
+
+TEST(AlbedoTables, Refusals) {
+  const auto refused = [](const absl::Status& status, std::string_view start) {
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << status;
+    EXPECT_TRUE(std::string(status.message()).starts_with(start)) << status;
+  };
+  refused(AlbedoTable::build({}, {.sizes = {.v = 1}}).status(), "sizes: ");
+  refused(AlbedoTable::build({}, {.samples = 3}).status(), "samples: ");
+  refused(AlbedoTable::build({.distribution = Distribution::phong}, small()).status(), "model.masking: ");
+  Batch batch;
+  batch.lanes = 1;
+  batch.incident = {0.0f, 0.0f, 1.0f};
+  batch.alpha_x = batch.alpha_y = 0.5f;
+  float albedo = -7;
+  batch.out.albedo = {&albedo, 1};
+  batch.mean_slope_x = 0.1f;
+  refused(facetwise::albedo(batch).status(), "mean_slope_x: ");
+  batch.mean_slope_x = {};
+  batch.model.interface = Interface::dielectric;
+  refused(facetwise::albedo(batch).status(), "model.interface: ");
+  batch.model.compensation = Compensation::turquin;
+  refused(check(Operation::sample_scattering, batch), "model.compensation: ");
+  batch.model.interface = Interface::conductor;
+  batch.model.compensation = static_cast<Compensation>(9);
+  refused(facetwise::albedo(batch).status(), "model.compensation: ");
+  EXPECT_EQ(albedo, -7);
+}
+
+}  // namespace
+}  // namespace facetwise::test
