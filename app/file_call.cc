@@ -166,8 +166,13 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   if (!statistics.ok()) return statistics.status();
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   if (auto status = (*output)->commit(); !status.ok()) return status;
-  return FileCallResult{
-      .statistics = *statistics, .sampler = batch.sampler, .ignored = inputs.ignored(), .seconds = seconds.count()};
+  std::size_t backfacing = 0;
+  for (std::size_t lane = 0; lane < batch.lanes; ++lane) backfacing += batch.incident.z[lane] <= 0;
+  return FileCallResult{.statistics = *statistics,
+                        .sampler = batch.sampler,
+                        .ignored = inputs.ignored(),
+                        .backfacing = backfacing,
+                        .seconds = seconds.count()};
 }
 
 }  // namespace facetwise::app

@@ -28,6 +28,7 @@ struct FileCallResult {
   Statistics statistics;
   Sampler sampler;                   // that was used
   std::vector<std::string> ignored;  // columns that facetwise knows and this call does not read
+  std::size_t backfacing = 0;        // lanes with i_z <= 0
   double seconds = 0;                // of the call, without reading and writing
 };
 

@@ -101,15 +101,18 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
                                          {"occluded", s.occluded},
                                          {"smooth", s.smooth},
                                          {"invalid", s.invalid},
+                                         {"backfacing", result.backfacing},
                                          {"seconds", result.seconds},
                                          {"ignored_columns", result.ignored}};
     fmt::print(stderr, "{}\n", json.dump());
     return;
   }
-  fmt::print(stderr, "facetwise {}: {} lanes: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
-             verb, s.lanes(), s.accepted, s.occluded, s.smooth, s.invalid,
-             call.operation == Operation::albedo ? "table" : name(result.sampler), verb_arguments.engine.shown(),
-             1e3 * result.seconds);
+  fmt::print(
+      stderr,
+      "facetwise {}: {} lanes, {} backfacing: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
+      verb, s.lanes(), result.backfacing, s.accepted, s.occluded, s.smooth, s.invalid,
+      call.operation == Operation::albedo ? "table" : name(result.sampler), verb_arguments.engine.shown(),
+      1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
 }

@@ -50,7 +50,12 @@ class Measuring {
   absl::Status run() {
     for (const Target target : available_targets()) {
       if (vector_lanes(target) < 8) continue;
-      over_scalar(target);
+      const bool wide = target == Target::avx3;
+      over_scalar("bounded", sampling(Sampler::bounded, Implementation::simd), target, wide ? 24 : 13);
+      if (!next()) return status_;
+      Case beckmann = sampling(Sampler::visible, Implementation::simd);
+      beckmann.distribution = Distribution::beckmann;
+      over_scalar("Beckmann's visible", beckmann, target, wide ? 20 : 12);
       if (!next()) return status_;
     }
     for (const Target target : available_targets()) {
@@ -102,14 +107,15 @@ class Measuring {
         .sampler = sampler, .alpha_x = alpha.x, .alpha_y = alpha.y, .batch = batch, .implementation = implementation};
   }
 
-  void over_scalar(Target target) {
-    TargetResult row{.what = fmt::format("bounded over scalar, {}", name(target)),
-                     .required = target == Target::avx3 ? 24.0 : 13.0,
+  void over_scalar(const char* what, Case simd, Target target, double required) {
+    TargetResult row{.what = fmt::format("{} over scalar, {}", what, name(target)),
+                     .required = required,
                      .measured = {},
                      .unit = "x",
                      .note = "smallest of"};
     for (const Roughness alpha : kAlphas) {
-      const Case simd = sampling(Sampler::bounded, Implementation::simd, kBatch, alpha);
+      simd.alpha_x = alpha.x;
+      simd.alpha_y = alpha.y;
       prepare(simd);
       Case scalar = simd;
       scalar.implementation = Implementation::scalar;

@@ -239,7 +239,7 @@ TEST(Sample, BadLanesAreCountedNotErrors) {
       "ix,iy,iz,alpha_x,alpha_y,pdf\n0,0,1,.5,.5,0\nnan,0,1,.5,.5,0\n0,0,2,.5,.5,0\n0,0,1,5e-5,.5,0\n";
   const auto text = facetwise({"sample", "--seed", "1"}, lanes);
   ASSERT_EQ(text.code, 0);
-  EXPECT_NE(text.err.find("4 lanes: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos) << text.err;
+  EXPECT_NE(text.err.find("4 lanes, 0 backfacing: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos) << text.err;
   EXPECT_NE(text.err.find("columns not read: pdf"), std::string::npos) << text.err;
   const auto json = facetwise({"sample", "--seed", "1", "--json"}, lanes);
   EXPECT_EQ(json.out, text.out);

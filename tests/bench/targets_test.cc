@@ -37,9 +37,9 @@ TEST(Targets, EachIsMeasuredOrSaysWhyNot) {
   std::size_t vector_targets = 0;
   for (const Target target : available_targets()) vector_targets += vector_lanes(target) >= 8;
   EXPECT_EQ(missing, 9 * vector_targets) << "16 M lanes do not fit into these columns";
-  // Per vector target three rows of samplers, eight of large batches and two of placements; small batches, threads and
+  // Per vector target four rows of samplers, eight of large batches and two of placements; small batches, threads and
   // remote.
-  EXPECT_EQ(report.targets.size(), 13 * vector_targets + 5);
+  EXPECT_EQ(report.targets.size(), 14 * vector_targets + 5);
 }
 
 TEST(Targets, WithoutServerOrThreads) {

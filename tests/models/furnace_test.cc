@@ -61,6 +61,28 @@ TEST_P(ModelFurnace, MeanWeightIsTheAlbedo) {
   }
 }
 
+// `exact` leaves less of the weights' variance than visible normals do: docs/models.md has the figures.
+TEST_P(ModelFurnace, ExactWeightsVaryLess) {
+  const std::vector<Sampler> samplers = samplers_of(GetParam(), Operation::sample_reflection);
+  if (std::find(samplers.begin(), samplers.end(), Sampler::exact) == samplers.end()) return;
+  for (const double theta : {0.0, 45.0, 75.0})
+    for (const float alpha : {0.5f, 1.0f}) {
+      Point point;
+      set_incident(point, direction(theta, 20));
+      point.alpha_x = point.alpha_y = alpha;
+      const auto moment = [&](Sampler sampler) {
+        double sum = 0, squares = 0;
+        for (const Result& r : draw(Operation::sample_reflection, plain(GetParam(), sampler), point, kCount, 9)) {
+          sum += r.weight;
+          squares += static_cast<double>(r.weight) * r.weight;
+        }
+        return squares * kCount / (sum * sum) - 1;
+      };
+      // Near grazing little is occluded at alpha = 1, so that the gain is small.
+      EXPECT_LT(moment(Sampler::exact), 0.97 * moment(Sampler::visible)) << theta << " degrees, alpha " << alpha;
+    }
+}
+
 // Over everything a lane may be: a weight of visible normals is at most 1.
 TEST_P(ModelFurnace, WeightsOfVisibleNormalsAreAtMostOne) {
   std::uint64_t seed = 1;
