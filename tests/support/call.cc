@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <set>
 
 #include "facetwise/albedo_table.h"
@@ -181,14 +182,17 @@ void add_compensated(const Model& model, std::vector<Call>& calls) {
   }
 }
 
-// Small tables: quick to build, wherever tests run.
-void keep_small_albedo_tables() {
-  for (Model model : all_models())
-    for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated}) {
-      model.shadowing = shadowing;
-      const auto table = AlbedoTable::build(model, {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4});
-      if (table.ok()) use_albedo_table(*table);
-    }
+// Small tables, quick to build wherever tests run, each when it is first needed: an emulator takes a second for all.
+void keep_small_albedo_table(const Model& model) {
+  static std::mutex mutex;
+  static std::vector<AlbedoTable::Key> kept;
+  const std::lock_guard lock(mutex);
+  const AlbedoTable::Key key = AlbedoTable::key_of(model);
+  if (std::find(kept.begin(), kept.end(), key) != kept.end()) return;
+  const auto table = AlbedoTable::build(model, {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4});
+  if (!table.ok()) return;  // calls say why
+  use_albedo_table(*table);
+  kept.push_back(key);
 }
 
 }  // namespace
@@ -202,7 +206,6 @@ std::vector<Call> plain_calls() {
 namespace {
 
 std::vector<Call> make_all_calls() {
-  keep_small_albedo_tables();
   std::vector<Call> calls;
   add_plain(calls);
   std::set<std::string> names;
@@ -313,6 +316,8 @@ Batch make_batch(const Call& call, const Lanes& lanes, Answer& answer) {
   batch.model.shadowing = call.shadowing;
   batch.sampler = call.sampler;
   batch.lanes = lanes.count;
+  if (call.operation == Operation::albedo || batch.model.compensation != Compensation::none)
+    keep_small_albedo_table(batch.model);
   for (std::size_t k = 0; k < lanes.in.size(); ++k)
     if (reads(call, input_fields()[k])) input_fields()[k].column(batch) = lanes.in[k];
   answer.out.resize(output_fields().size());
