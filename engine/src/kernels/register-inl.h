@@ -34,7 +34,7 @@ struct Registrar {
     using T = std::conditional_t<Drawer::kExact || S::Distribution::kLongChains, Pairs, D>;
     kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
     if constexpr (S::Distribution::kWaitsForMemory && kStreams<D>)
-      kernels.sample_ahead[index] = ForEachVector<T, Sample<T, S, Drawer>, true>;
+      kernels.sample_ahead[index] = ForEachVector<Pairs, Sample<Pairs, S, Drawer>, true>;
     kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
     if constexpr (Drawer::kNormals) {
       kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;
