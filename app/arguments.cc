@@ -50,7 +50,7 @@ void ModelArguments::add(CLI::App& app) {
             "radiance|importance");
   add_named(app, "--compensation", model.compensation, parse_compensation,
             "What is added for light that is scattered more than once, to weights and values; default none. Its table "
-            "takes a second or two on first use",
+            "takes seconds on first use",
             "none|turquin");
   app.add_flag("--retro", model.retro, "Reflect back to where the light comes from");
 }

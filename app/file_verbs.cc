@@ -48,15 +48,13 @@ struct FileVerb {
   // The table of albedo that the call reads, if it does: built with progress, or read from --albedo-table. A server
   // has its own.
   absl::Status prepare_albedo() const {
-    if (call.operation != Operation::albedo && call.model.compensation == Compensation::none) {
-      if (albedo_table.empty()) return absl::OkStatus();
-      return invalid("--albedo-table: read by `facetwise albedo` and with --compensation only");
-    }
-    if (!engine.remote.empty()) {
-      if (albedo_table.empty()) return absl::OkStatus();
+    const bool given = !albedo_table.empty(), reads = reads_albedo(call.operation, call.model);
+    if (given && !reads)
+      return invalid("--albedo-table: read by `facetwise albedo`, and by sample and evaluate with --compensation");
+    if (given && !engine.remote.empty())
       return invalid("--albedo-table: a server has its own; leave out --albedo-table or --remote");
-    }
-    if (!albedo_table.empty() && std::filesystem::exists(albedo_table)) {
+    if (!reads || !engine.remote.empty()) return absl::OkStatus();
+    if (given && std::filesystem::exists(albedo_table)) {
       auto table = AlbedoTable::load(albedo_table);
       if (!table.ok()) return table.status();
       if (!(*table)->fits(call.model))
@@ -68,7 +66,7 @@ struct FileVerb {
     Progress progress("facetwise: table of albedo");
     const auto table = facetwise::albedo_table(call.model, [&](double done) { progress(done); });
     if (!table.ok()) return table.status();
-    return albedo_table.empty() ? absl::OkStatus() : (*table)->save(albedo_table);
+    return given ? (*table)->save(albedo_table) : absl::OkStatus();
   }
 };
 
@@ -111,7 +109,7 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
       stderr,
       "facetwise {}: {} lanes, {} backfacing: {} accepted, {} occluded, {} smooth, {} invalid; {} by {} in {:.3g} ms\n",
       verb, s.lanes(), result.backfacing, s.accepted, s.occluded, s.smooth, s.invalid,
-      call.operation == Operation::albedo ? "table" : name(result.sampler), verb_arguments.engine.shown(),
+      has_sampler(call.operation) ? name(result.sampler) : "table", verb_arguments.engine.shown(),
       1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
@@ -128,8 +126,7 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   command.add_option("-o,--output", call.output, "File to write; default -. It appears when it is complete")
       ->type_name("FILE");
   arguments->model.add(command);
-  const bool samples = operation != Operation::albedo;
-  if (samples)
+  if (has_sampler(operation))
     add_named(command, "--sampler", arguments->sampler, parse_sampler,
               operation == Operation::sample_reflection
                   ? "How directions are drawn; default exact where the model has it, else visible"
@@ -141,7 +138,7 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   const auto add_constant = [&](const char* flag, std::optional<float>& value, const char* help) {
     command.add_option(flag, value, help)->option_text("X");
   };
-  if (samples) {
+  if (has_sampler(operation)) {
     add_constant("--eta", call.eta, "eta of all lanes");
     add_constant("--f0", call.f0, "f0 of all lanes");
     add_constant("--f90", call.f90, "f90 of all lanes");

@@ -81,11 +81,6 @@ std::vector<float> uniform_numbers(std::size_t count, std::uint64_t seed) {
   return numbers;
 }
 
-bool samples(Operation operation) {
-  return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
-         operation == Operation::sample_transmission || operation == Operation::sample_scattering;
-}
-
 bool reads(Operation operation, std::string_view name) {
   const auto fields = input_fields();
   return std::any_of(fields.begin(), fields.end(), [&](const InputField& field) {
@@ -192,10 +187,10 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
   bool any = false;
   std::size_t turn = 0;
   for (const Operation operation : all_operations()) {
-    const bool scatters = operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
-    if (ggx_smith && !scatters) continue;  // add_ggx_smith()
+    const bool both_sides = scatters(operation);
+    if (ggx_smith && !both_sides) continue;  // add_ggx_smith()
     Model model = composition;
-    model.interface = scatters ? Interface::dielectric : Interface::conductor;
+    model.interface = both_sides ? Interface::dielectric : Interface::conductor;
     for (const Sampler sampler : samplers_for(operation, model)) {
       if (std::find(samplers.begin(), samplers.end(), sampler) == samplers.end()) continue;
       any = true;
@@ -203,7 +198,7 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
       if (turn % 3 == 0) what.model.shadowing = Shadowing::uncorrelated;
       if (turn % 3 == 1) what.model.normalisation = Normalisation::biased;
       if (turn % 4 == 1) what.model.transport = Transport::importance;
-      if (!scatters && operation != Operation::sample_normal)
+      if (!both_sides && operation != Operation::sample_normal)
         what.model.interface = turn % 2 == 0 ? Interface::schlick : Interface::dielectric;
       if (turn % 5 == 3) what.model.retro = true;
       cases.push_back(what);

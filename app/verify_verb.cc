@@ -46,7 +46,7 @@ std::string sampler_name(const VerifyCase& what) {
 std::string shown(const VerifyCase& what) {
   std::string text(name(what.operation));
   const bool samples = text.starts_with("sample_");
-  if (what.operation != Operation::masking && what.operation != Operation::albedo)
+  if (has_sampler(what.operation))
     text += fmt::format(" {}", sampler_name(what));
   else if (const std::string model = model_name(name(what.model.distribution), name(what.model.masking));
            !model.empty())

@@ -77,9 +77,7 @@ std::vector<Case> model_cases() {
   const auto add = [&](Operation operation, Distribution distribution, Masking masking) {
     const Case which{.operation = operation, .distribution = distribution, .masking = masking, .sampler = std::nullopt};
     const auto samplers = samplers_for(operation, which.model());
-    if (operation == Operation::evaluate_reflection || operation == Operation::masking ||
-        operation == Operation::albedo)
-      cases.push_back(which);
+    if (operation == Operation::evaluate_reflection || !has_sampler(operation)) cases.push_back(which);
     for (const Sampler sampler : samplers) {
       if (which.is_ggx_smith() && sampler == Sampler::visible) continue;
       cases.push_back(which);

@@ -32,17 +32,10 @@ struct Case {
   Implementation implementation = Implementation::simd;
   Inputs inputs = Inputs::columns;
 
-  bool is_sampling() const {
-    return operation == Operation::sample_reflection || operation == Operation::sample_normal ||
-           operation == Operation::sample_transmission || operation == Operation::sample_scattering;
-  }
+  bool is_sampling() const { return samples(operation); }
   // Of a dielectric; the others' interface is a conductor.
-  bool scatters() const {
-    return operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
-  }
-  bool has_outgoing() const {  // among its inputs
-    return !is_sampling() && operation != Operation::masking && operation != Operation::albedo;
-  }
+  bool scatters() const { return facetwise::scatters(operation); }
+  bool has_outgoing() const { return !is_sampling() && has_sampler(operation); }  // among its inputs
   bool is_mixed() const { return alpha_x == 0; }
   // Lanes of the columns that it goes through.
   std::size_t lanes() const { return inputs == Inputs::fresh ? kFreshLanes : batch; }

@@ -79,7 +79,7 @@ absl::Status Columns::prepare(const Case& which) {
   set_roughness(which.alpha_x, which.alpha_y, which.lanes());
   if (which.inputs == Inputs::malloc_placed)
     for (int k = 0; k < kInputs; ++k) std::copy_n(input(k), which.batch, malloc_column(k));
-  if (which.is_sampling() || !which.has_outgoing()) return absl::OkStatus();
+  if (!which.has_outgoing()) return absl::OkStatus();
   const std::size_t lanes = which.batch;
   const Case drawing{.operation = which.operation == Operation::evaluate_transmission ? Operation::sample_transmission
                                   : which.operation == Operation::evaluate_scattering ? Operation::sample_scattering

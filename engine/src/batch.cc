@@ -3,7 +3,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "src/check.h"
-#include "src/composition.h"
 #include "src/float_environment.h"
 #include "src/parallel.h"
 #include "src/plan.h"
@@ -20,18 +19,19 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
     return absl::FailedPreconditionError(
         absl::StrCat("target: this CPU or build has no ", absl::string_view(wanted.data(), wanted.size())));
   }
+  Plan plan;
+  plan.compensated = compensated_output(operation, batch.model, columns);
   std::shared_ptr<const AlbedoTable> albedo;
-  if (operation == Operation::albedo || compensated(operation, batch)) {
+  if (operation == Operation::albedo || plan.compensated != kOutputs) {
     auto table = albedo_table(batch.model);
     if (!table.ok()) return table.status();
     albedo = *std::move(table);
+    plan.constants.albedo = &albedo->view();
   }
-  Plan plan;
   // GGX takes a nanosecond or four a lane, the others around ten.
   const std::size_t positions = batch.active ? batch.active->size() : batch.lanes;
   const Threading threading(positions, batch.model.distribution == Distribution::ggx ? 65536 : 16384, execution);
-  make_plan(operation, batch, columns, kernels(*target, execution.one_lane), threading.spreads(), execution,
-            albedo ? &albedo->view() : nullptr, plan);
+  make_plan(operation, batch, columns, kernels(*target, execution.one_lane), threading.spreads(), execution, plan);
   const auto run_range = [&](std::size_t begin, std::size_t end) {
     const FloatEnvironment ieee;
     const Statistics statistics = Stage(plan).run(begin, end);

@@ -28,11 +28,6 @@ bool evaluates(Operation operation) {
          operation == Operation::evaluate_scattering;
 }
 
-bool scatters(Operation operation) {
-  return operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
-}
-bool has_sampler(Operation operation) { return operation != Operation::masking && operation != Operation::albedo; }
-
 const SurfaceKernels& surface_of(const DistributionKernels& kernels, Masking masking, bool affine) {
   static constexpr SurfaceKernels kNone{};
   if (masking == Masking::vcavity) return affine ? kNone : kernels.vcavity;
@@ -72,11 +67,6 @@ Sampler sampler_of(Operation operation, const Batch& batch) {
   return reads_it ? batch.sampler : Sampler::visible;
 }
 
-bool samples(Operation operation) {
-  return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
-         operation == Operation::sample_transmission || operation == Operation::sample_scattering;
-}
-
 Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine,
                    bool ahead) {
   const SurfaceKernels& surface =
@@ -101,12 +91,6 @@ Kernel find_kernel(const TargetKernels& table, Operation operation, const Model&
 Kernel find_compensation(const TargetKernels& table, const Model& model, bool affine) {
   return surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine)
       .compensation;
-}
-
-bool compensated(Operation operation, const Batch& batch) {
-  if (batch.model.compensation == Compensation::none) return false;
-  return (operation == Operation::sample_reflection && batch.out.weight.present()) ||
-         (operation == Operation::evaluate_reflection && batch.out.value.present());
 }
 
 std::vector<Sampler> samplers_for(Operation operation, const Model& model) {

@@ -15,9 +15,5 @@ inline bool is_affine(const Batch& batch) {
 }
 // The batch's sampler, or `visible`, which every model has, where the operation does not read it.
 Sampler sampler_of(Operation operation, const Batch& batch);
-// Whether the call's results are compensated.
-bool compensated(Operation operation, const Batch& batch);
-// Whether the operation draws random numbers.
-bool samples(Operation operation);
 
 }  // namespace facetwise

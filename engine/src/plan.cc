@@ -35,29 +35,33 @@ std::size_t lanes_to_line(const void* data) {
   return -(reinterpret_cast<std::uintptr_t>(data) / sizeof(float)) % kLine;
 }
 
+// Calls body(address, whether it is an output) for each contiguous column.
+template <class Body>
+void for_each_contiguous(const Plan& plan, const Body& body) {
+  for (std::size_t c = 0; c < plan.per_lane_count; ++c)
+    if (plan.per_lane[c].contiguous) body(plan.per_lane[c].column->data(), false);
+  for (std::size_t c = 0; c < plan.out_count; ++c)
+    if (plan.out[c].contiguous) body(plan.out[c].column->data(), true);
+}
+
 // The head that brings most columns onto lines; a store that straddles two lines costs more than such a load.
 std::size_t best_head(const Plan& plan) {
   constexpr unsigned kInputWeight = 1, kOutputWeight = 3;
   unsigned votes[kLine] = {};
-  for (std::size_t c = 0; c < plan.per_lane_count; ++c)
-    if (plan.per_lane[c].contiguous) votes[lanes_to_line(plan.per_lane[c].column->data())] += kInputWeight;
-  for (std::size_t c = 0; c < plan.out_count; ++c)
-    if (plan.out[c].contiguous) votes[lanes_to_line(plan.out[c].column->data())] += kOutputWeight;
+  for_each_contiguous(plan, [&](const void* data, bool output) {
+    votes[lanes_to_line(data)] += output ? kOutputWeight : kInputWeight;
+  });
   return static_cast<std::size_t>(std::max_element(votes, votes + kLine) - votes);
 }
 
 // Whether more columns lie at one place of their pages, and so in one set of the first-level cache, than it can well
-// serve. Measured with 8 ways: docs/benchmarks.md.
+// serve. Measured with 8 ways: docs/numerics.md, "Fetching ahead".
 bool share_a_set(const Plan& plan) {
   constexpr unsigned kLinesOfPage = 4096 / sizeof(float) / kLine, kMany = 4;
   unsigned columns[kLinesOfPage] = {}, most = 0;
-  const auto count = [&](const void* data) {
+  for_each_contiguous(plan, [&](const void* data, bool) {
     most = std::max(most, ++columns[reinterpret_cast<std::uintptr_t>(data) / (kLine * sizeof(float)) % kLinesOfPage]);
-  };
-  for (std::size_t c = 0; c < plan.per_lane_count; ++c)
-    if (plan.per_lane[c].contiguous) count(plan.per_lane[c].column->data());
-  for (std::size_t c = 0; c < plan.out_count; ++c)
-    if (plan.out[c].contiguous) count(plan.out[c].column->data());
+  });
   return most > kMany;
 }
 
@@ -75,8 +79,14 @@ bool streams(const Plan& plan, bool spreads, const Execution& execution) {
 
 }  // namespace
 
+OutputIndex compensated_output(Operation operation, const Model& model, const PresentColumns& columns) {
+  if (operation == Operation::albedo || !reads_albedo(operation, model)) return kOutputs;
+  const OutputIndex index = operation == Operation::sample_reflection ? kOutWeight : kOutValue;
+  return columns.out_bits >> index & 1 ? index : kOutputs;
+}
+
 void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
-               bool spreads, const Execution& execution, const AlbedoTableView* albedo, Plan& plan) {
+               bool spreads, const Execution& execution, Plan& plan) {
   const Model& model = batch.model;
   plan.table = &table;
   const bool affine = is_affine(batch);
@@ -125,24 +135,24 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
   // Operations without reflectances do not read its columns.
   if (known_to::kDielectric & bit(operation)) plan.constants.interface = model.interface;
   plan.constants.table = model.table ? &model.table->view() : nullptr;
-  plan.constants.albedo = albedo;
-  if (compensated(operation, batch)) {
+  if (plan.compensated != kOutputs) {
     plan.compensation = find_compensation(table, model, affine);
-    plan.compensated = operation == Operation::sample_reflection ? kOutWeight : kOutValue;
     plan.buffers = true;
   }
 
   if (plan.active || plan.positions < kLanesWorthHead) return;
   plan.head = best_head(plan);
   if ((execution.stores == Stores::streaming || larger_than_caches(plan)) && share_a_set(plan)) {
-    plan.ahead = true;
-    plan.kernel = find_kernel(table, operation, model, sampler_of(operation, batch), affine, true);
+    const Kernel ahead = find_kernel(table, operation, model, sampler_of(operation, batch), affine, true);
+    plan.ahead = ahead != plan.kernel;
+    plan.kernel = ahead;
   }
   if (!streams(plan, spreads, execution)) return;
   for (std::size_t c = 0; c < plan.out_count; ++c) {
     const auto& [index, column, contiguous] = plan.out[c];
-    const bool touched_again = plan.compensation != nullptr && index == static_cast<unsigned>(plan.compensated);
-    if (contiguous && !touched_again && lanes_to_line(column->data()) == plan.head) plan.streamed |= 1u << index;
+    // What is compensated is read again.
+    if (contiguous && index != plan.compensated && lanes_to_line(column->data()) == plan.head)
+      plan.streamed |= 1u << index;
   }
 }
 

@@ -21,11 +21,11 @@ struct Plan {
   // Lanes before most columns' first whole cache line. They are run by way of buffers, so that every later tile begins
   // on a line: columns from malloc share one place in their lines.
   std::size_t head = 0;
-  unsigned streamed = 0;                 // Tile::streamed of tiles that begin at `head` or a multiple of kLine beyond
-  bool ahead = false;                    // inputs, and outputs that are not streamed, are fetched ahead
-  Kernel compensation = nullptr;         // runs before `kernel`
-  OutputIndex compensated = kOutWeight;  // what its factors are for
-  bool buffers = false;                  // some column goes by way of buffers in every tile
+  unsigned streamed = 0;               // Tile::streamed of tiles that begin at `head` or a multiple of kLine beyond
+  bool ahead = false;                  // inputs, and outputs that are not streamed, are fetched ahead
+  Kernel compensation = nullptr;       // runs before `kernel`
+  OutputIndex compensated = kOutputs;  // what its factors are for; kOutputs: there is none
+  bool buffers = false;                // some column goes by way of buffers in every tile
 
   // The columns that there are, by the tile's indices.
   struct Input {
@@ -49,8 +49,12 @@ struct Plan {
   const OutputColumn<std::uint8_t>* bytes[kByteOutputs] = {};  // null: absent
 };
 
-// The batch is checked; it and `columns` live as long as the plan. `spreads`: over several threads.
+// The output that a call's compensation changes, for Plan::compensated.
+OutputIndex compensated_output(Operation operation, const Model& model, const PresentColumns& columns);
+
+// Makes what the caller has not: `compensated`, and the table of albedo that it or the operation needs. The batch is
+// checked; it and `columns` live as long as the plan. `spreads`: over several threads.
 void make_plan(Operation operation, const Batch& batch, const PresentColumns& columns, const TargetKernels& table,
-               bool spreads, const Execution& execution, const AlbedoTableView* albedo, Plan& plan);
+               bool spreads, const Execution& execution, Plan& plan);
 
 }  // namespace facetwise

@@ -120,11 +120,12 @@ class Stage {
   // Each column at a distance of its own; beyond a column's end nothing happens.
   void point_ahead(std::size_t begin, bool in_place) {
     constexpr std::size_t kFirst = 4 * kLine, kStep = 8 * kLine;
+    tile_.ahead = ahead_;
     tile_.ahead_count = 0;
     if (!in_place) return;
     const auto add = [&](const float* data) {
       const std::size_t distance = kFirst + kStep * tile_.ahead_count;
-      tile_.ahead[tile_.ahead_count++] = data + begin + distance;
+      ahead_[tile_.ahead_count++] = data + begin + distance;
     };
     for (std::size_t c = 0; c < plan_.per_lane_count; ++c)
       if (plan_.per_lane[c].contiguous) add(plan_.per_lane[c].column->data());
@@ -161,6 +162,7 @@ class Stage {
 
   const Plan& plan_;
   Tile tile_;
+  const float* ahead_[std::size_t{kInputs} + kOutputs];
   alignas(64) float in_[kInputs][kStaged];
   alignas(64) float out_[kOutputs][kStaged];
   alignas(64) float factor_[kStaged];

@@ -47,14 +47,14 @@ struct TileConstants {
 struct Tile : TileConstants {
   explicit Tile(const TileConstants& constants) : TileConstants(constants) {}
   std::size_t lanes = 0;
-  unsigned streamed = 0;           // as `wanted`: stored past the caches; those begin at a cache line
-  std::uint8_t* status = nullptr;  // null unless wanted
-  std::uint8_t* event = nullptr;   // likewise
-  const float* in[kInputs];        // those that the operation reads, the optional ones too
-  float* out[kOutputs];            // the wanted ones
-  float* factor = nullptr;         // of compensation: what it computes
-  std::size_t ahead_count = 0;     // for kernels that fetch ahead: columns, as far ahead as each is fetched
-  const float* ahead[std::size_t{kInputs} + kOutputs];
+  unsigned streamed = 0;                // as `wanted`: stored past the caches; those begin at a cache line
+  std::uint8_t* status = nullptr;       // null unless wanted
+  std::uint8_t* event = nullptr;        // likewise
+  const float* in[kInputs];             // those that the operation reads, the optional ones too
+  float* out[kOutputs];                 // the wanted ones
+  float* factor = nullptr;              // of compensation: what it computes
+  std::size_t ahead_count = 0;          // for kernels that fetch ahead
+  const float* const* ahead = nullptr;  // columns, as far ahead as each is fetched
 };
 
 // Adds the tile's lanes that are not accepted to the statistics.

@@ -67,7 +67,7 @@ Batch Lanes::batch(Operation operation, Sampler sampler) const {
     batch.u1 = columns[5];
     batch.u2 = columns[6];
     if (uses_u3({}, sampler)) batch.u3 = columns[7];
-  } else if (operation != Operation::masking && operation != Operation::albedo) {
+  } else if (has_sampler(operation)) {
     batch.outgoing = {columns[8], columns[9], columns[10]};
   }
   return batch;

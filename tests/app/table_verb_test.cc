@@ -26,11 +26,20 @@ std::string text_of_slopes(double mean) {
 
 const std::string kLane = "ix,iy,iz,alpha_x,alpha_y\n0.6,0,0.8,0.5,0.5\n-0.3,0.4,0.8660254,0.5,0.7\n";
 
-TEST(TableVerb, SavedTablesGiveTheSameSamples) {
+// A table that `facetwise table` builds from such a text, called with `option`.
+struct Built {
+  Built(double mean, const std::string& option) {
+    write_file(text, text_of_slopes(mean));
+    result = facetwise({"table", "--input", text, "--output", saved, option});
+  }
   const Directory directory;
   const std::string text = directory.path("slopes.txt"), saved = directory.path("slopes.table");
-  write_file(text, text_of_slopes(0.25));
-  const auto built = facetwise({"table", "--input", text, "--output", saved, "--json"});
+  Result result;
+};
+
+TEST(TableVerb, SavedTablesGiveTheSameSamples) {
+  const Built table(0.25, "--json");
+  const Result& built = table.result;
   ASSERT_EQ(built.code, 0) << built.err;
   EXPECT_NE(built.err.find("facetwise table: 100 %"), std::string::npos) << built.err;
   const auto report = nlohmann::json::parse(built.out);
@@ -44,19 +53,17 @@ TEST(TableVerb, SavedTablesGiveTheSameSamples) {
     EXPECT_EQ(result.code, 0) << result.err;
     return result.out;
   };
-  EXPECT_EQ(sample(saved), sample(text));
+  EXPECT_EQ(sample(table.saved), sample(table.text));
 }
 
 TEST(TableVerb, RadialTablesTakeVcavity) {
-  const Directory directory;
-  const std::string text = directory.path("slopes.txt"), saved = directory.path("slopes.table");
-  write_file(text, text_of_slopes(0));
-  const auto built = facetwise({"table", "--input", text, "--output", saved, "--radial"});
+  const Built table(0, "--radial");
+  const Result& built = table.result;
   ASSERT_EQ(built.code, 0) << built.err;
   EXPECT_NE(built.out.find("radial"), std::string::npos) << built.out;
   EXPECT_EQ(built.out.find("not radial"), std::string::npos) << built.out;
   const auto result =
-      facetwise({"sample", "--distribution", "table:" + saved, "--masking", "vcavity", "--seed", "5"}, kLane);
+      facetwise({"sample", "--distribution", "table:" + table.saved, "--masking", "vcavity", "--seed", "5"}, kLane);
   EXPECT_EQ(result.code, 0) << result.err;
 }
 

@@ -75,8 +75,7 @@ TEST(ForcedTarget, IsTheOneThatRuns) {
   const Lanes lanes = hard_lanes(Kind::ordinary, 4096, 15);
   for (const Operation operation : all_operations()) {
     Call call{operation, Sampler::cap, Shadowing::correlated};
-    if (operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering)
-      call.model.interface = Interface::dielectric;
+    if (scatters(operation)) call.model.interface = Interface::dielectric;
     for (const Target target : available_targets())
       for (const bool one_lane : {false, true}) {
         const auto kernels = profile(call, lanes, {.target = target, .one_lane = one_lane, .threads = Threads::one});

@@ -17,11 +17,6 @@ using reference::Vector;
 
 constexpr float kBelowOne = 1 - 0x1p-24f;
 
-bool transmits(Operation operation) { return operation >= Operation::sample_transmission; }
-bool samples(Operation operation) {
-  return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
-         operation == Operation::sample_transmission || operation == Operation::sample_scattering;
-}
 bool reads_interface(Operation operation) {
   return operation != Operation::sample_normal && operation != Operation::pdf_reflection &&
          operation != Operation::masking;
@@ -65,7 +60,7 @@ std::vector<Sampler> samplers_of(const Family& family, Operation operation) {
   std::vector<Sampler> fit;
   for (const Sampler sampler : all_samplers()) {
     Composition composition = plain(family, sampler);
-    if (transmits(operation)) composition.model.interface = Interface::dielectric;
+    if (scatters(operation)) composition.model.interface = Interface::dielectric;
     const Point point[1];
     Result result[1];
     if (check(operation, make_batch(operation, composition, point, result)).ok()) fit.push_back(sampler);
@@ -105,7 +100,7 @@ std::vector<Composition> compositions(const Family& family, Operation operation)
       for (const Normalisation normalisation : {Normalisation::unbiased, Normalisation::biased})
         for (const Interface interface : {Interface::conductor, Interface::schlick, Interface::dielectric})
           for (const bool retro : {false, true}) {
-            if (transmits(operation) && interface != Interface::dielectric) continue;
+            if (scatters(operation) && interface != Interface::dielectric) continue;
             if (!reads_interface(operation) && interface != Interface::conductor) continue;
             Composition c = plain(family, sampler);
             c.model.shadowing = shadowing;
@@ -157,7 +152,7 @@ Batch make_batch(Operation operation, const Composition& c, std::span<const Poin
       b.out.outgoing = {out(&Result::ox), out(&Result::oy), out(&Result::oz)};
       b.out.weight = out(&Result::weight);
     }
-    if (transmits(operation)) b.out.eta_scale = out(&Result::eta_scale);
+    if (scatters(operation)) b.out.eta_scale = out(&Result::eta_scale);
   } else if (operation == Operation::masking) {
     if (c.model.masking == Masking::smith) b.out.masking = out(&Result::masking);
     b.out.projected_area = out(&Result::area);

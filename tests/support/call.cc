@@ -99,8 +99,7 @@ std::string call_name(const Call& call) {
     append(model.distribution);
     text.append("-").append(name(model.masking));
   }
-  if (call.operation != Operation::masking && call.operation != Operation::albedo && !call.values_alone)
-    append(call.sampler);
+  if (has_sampler(call.operation) && !call.values_alone) append(call.sampler);
   if (call.shadowing == Shadowing::uncorrelated) append(call.shadowing);
   if (model.normalisation != Normalisation::unbiased) append(model.normalisation);
   if (model.interface != Interface::conductor) append(model.interface);
@@ -316,8 +315,7 @@ Batch make_batch(const Call& call, const Lanes& lanes, Answer& answer) {
   batch.model.shadowing = call.shadowing;
   batch.sampler = call.sampler;
   batch.lanes = lanes.count;
-  if (call.operation == Operation::albedo || batch.model.compensation != Compensation::none)
-    keep_small_albedo_table(batch.model);
+  if (reads_albedo(call.operation, batch.model)) keep_small_albedo_table(batch.model);
   for (std::size_t k = 0; k < lanes.in.size(); ++k)
     if (reads(call, input_fields()[k])) input_fields()[k].column(batch) = lanes.in[k];
   answer.out.resize(output_fields().size());

@@ -13,7 +13,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "facetwise/model.h"
+#include "facetwise/batch.h"
 
 namespace facetwise {
 
@@ -88,8 +88,15 @@ class AlbedoTable {
   Key key_{};
 };
 
+// Whether an operation reads the model's table: albedo, and those that its compensation changes.
+constexpr bool reads_albedo(Operation operation, const Model& model) {
+  return operation == Operation::albedo ||
+         (model.compensation != Compensation::none &&
+          (operation == Operation::sample_reflection || operation == Operation::evaluate_reflection));
+}
+
 // The table that calls use for a model, kept for the life of the process: built with the default options on first use
-// (a second or two; other calls that need it wait), unless use_albedo_table() has put one in its place.
+// (seconds; other calls that need it wait), unless use_albedo_table() has put one in its place.
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> albedo_table(const Model& model,
                                                                 const std::function<void(double)>& progress = {});
 void use_albedo_table(std::shared_ptr<const AlbedoTable> table);

@@ -52,6 +52,20 @@ enum class Operation : std::uint8_t {
   albedo = 9,
 };
 
+// Whether an operation draws random numbers.
+constexpr bool samples(Operation operation) {
+  return operation == Operation::sample_normal || operation == Operation::sample_reflection ||
+         operation == Operation::sample_transmission || operation == Operation::sample_scattering;
+}
+// Whether an operation draws by a sampler, or gives a sampler's density.
+constexpr bool has_sampler(Operation operation) {
+  return operation != Operation::masking && operation != Operation::albedo;
+}
+// Whether it is one of a dielectric's, which also transmits: *_transmission and *_scattering.
+constexpr bool scatters(Operation operation) {
+  return operation >= Operation::sample_transmission && operation <= Operation::evaluate_scattering;
+}
+
 std::string_view name(Operation);
 std::optional<Operation> parse_operation(std::string_view);
 std::span<const Operation> all_operations();
@@ -147,7 +161,7 @@ struct OutputField {
 };
 
 // The samplers that a model has for an operation's draws or pdf, whatever columns are given; empty where the model
-// itself makes no sense, and for masking.
+// itself makes no sense, and for operations without one.
 std::vector<Sampler> samplers_for(Operation, const Model&);
 // `exact` where the batch's model and columns have it for the operation, else `visible`.
 Sampler default_sampler(Operation, const Batch&);

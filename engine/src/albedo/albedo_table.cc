@@ -1,28 +1,22 @@
 // Tables of albedo as bytes and files, and those that the process keeps.
 //
-// The bytes: 8 of magic, the version, distribution, masking and shadowing as uint32, the id of the table of slopes as
-// uint64, the six sizes as uint32, the values as float32, and the FNV-1a hash of all before as uint64; little-endian.
+// The bytes (src/table/sealed.h): 8 of magic, the version, distribution, masking and shadowing as uint32, the id of the
+// table of slopes as uint64, the six sizes as uint32, the values.
 #include "facetwise/albedo_table.h"
 
-#include <bit>
-#include <cmath>
 #include <cstring>
 #include <mutex>
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/slope_table.h"
 #include "src/albedo/layout.h"
-#include "src/table/layout.h"
-#include "src/whole_file.h"
+#include "src/table/sealed.h"
 #include "tbb/task_arena.h"
 
 namespace facetwise {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "values are written as they lie in memory");
-
-constexpr char kMagic[] = {'f', 'w', 'a', 'l', 'b', 'e', 'd', '\x1a'};
-constexpr std::uint32_t kVersion = 1;
+constexpr Seal kSeal = {{'f', 'w', 'a', 'l', 'b', 'e', 'd', '\x1a'}, 1, "albedo", "AlbedoTable"};
 struct Header {
   char magic[8];
   std::uint32_t version, distribution, masking, shadowing;
@@ -101,44 +95,24 @@ std::string AlbedoTable::description() const {
 
 std::string AlbedoTable::serialise() const {
   Header header{{},
-                kVersion,
+                kSeal.version,
                 static_cast<std::uint32_t>(key_.distribution),
                 static_cast<std::uint32_t>(key_.masking),
                 static_cast<std::uint32_t>(key_.shadowing),
                 key_.slopes,
                 view_.sizes};
-  std::memcpy(header.magic, kMagic, sizeof kMagic);
-  std::string bytes(reinterpret_cast<const char*>(&header), sizeof header);
-  bytes.append(reinterpret_cast<const char*>(values_.data()), values_.size() * sizeof(float));
-  const std::uint64_t hash = fnv1a(bytes.data(), bytes.size());
-  bytes.append(reinterpret_cast<const char*>(&hash), sizeof hash);
-  return bytes;
+  std::memcpy(header.magic, kSeal.magic, sizeof kSeal.magic);
+  return seal(header, values_);
 }
 
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::parse(std::string_view bytes) {
-  Header header;
-  std::uint64_t hash;
-  if (bytes.size() < sizeof kMagic || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
-    return invalid("not a table of albedo; make one with AlbedoTable::save");
-  if (bytes.size() < sizeof header + sizeof hash)
-    return invalid("truncated: ", bytes.size(), " bytes; copy it again or rebuild it");
-  std::memcpy(&header, bytes.data(), sizeof header);
-  if (header.version != kVersion)
-    return invalid("version ", header.version, "; this facetwise reads version ", kVersion, ": rebuild the table");
-  if (auto status = check_sizes(header.sizes); !status.ok())
-    return invalid("corrupted (", status.message(), "); copy it again or rebuild it");
-  const std::size_t size = sizeof header + header.sizes.total() * sizeof(float) + sizeof hash;
-  if (bytes.size() != size)
-    return invalid(bytes.size() < size ? "truncated: " : "corrupted: ", bytes.size(), " bytes instead of ", size,
-                   "; copy it again or rebuild it");
-  std::memcpy(&hash, bytes.data() + size - sizeof hash, sizeof hash);
-  if (hash != fnv1a(bytes.data(), size - sizeof hash) ||
-      header.distribution > static_cast<std::uint32_t>(Distribution::table) ||
+  auto unsealed = unseal<Header>(bytes, kSeal);
+  if (!unsealed.ok()) return unsealed.status();
+  auto& [header, values] = *unsealed;
+  if (header.distribution > static_cast<std::uint32_t>(Distribution::table) ||
       header.masking > static_cast<std::uint32_t>(Masking::vcavity) ||
       header.shadowing > static_cast<std::uint32_t>(Shadowing::uncorrelated))
-    return invalid("corrupted: its hash is another; copy it again or rebuild it");
-  std::vector<float> values(header.sizes.total());
-  std::memcpy(values.data(), bytes.data() + sizeof header, values.size() * sizeof(float));
+    return corrupted_by_hash();
   for (const float value : values)
     if (!(value > 0 && value < 1000)) return invalid("an albedo of ", value, "; rebuild it");
   return AlbedoTableMaker::make(header.sizes,
@@ -150,11 +124,7 @@ absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::parse(std::strin
 absl::Status AlbedoTable::save(const std::string& path) const { return replace_file(path, serialise()); }
 
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::load(const std::string& path) {
-  const auto bytes = read_file(path);
-  if (!bytes.ok()) return bytes.status();
-  auto table = parse(*bytes);
-  if (!table.ok()) return of_file(path, table.status());
-  return table;
+  return load_table<AlbedoTable>(path);
 }
 
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> albedo_table(const Model& model,

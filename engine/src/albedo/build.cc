@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <span>
 
 #include "absl/strings/str_cat.h"
@@ -33,6 +34,24 @@ struct Points {
   std::vector<float> u1, u2, u3;
 };
 
+// Directions spread by their cosine, each with a point: a quarter disc, which is like the others, by points of its square.
+struct Disc {
+  explicit Disc(const Points& from) {
+    for (std::size_t k = 0; k < from.u1.size(); ++k) {
+      const double dx = Points::radical_inverse(k, 5), dy = Points::radical_inverse(k, 7), squared = dx * dx + dy * dy;
+      if (squared >= 1) continue;
+      x.push_back(static_cast<float>(dx));
+      y.push_back(static_cast<float>(dy));
+      z.push_back(static_cast<float>(std::sqrt(1 - squared)));
+      points.u1.push_back(from.u1[k]);
+      points.u2.push_back(from.u2[k]);
+      points.u3.push_back(from.u3[k]);
+    }
+  }
+  std::vector<float> x, y, z;
+  Points points{0};
+};
+
 // A direction and a roughness that have the coordinates v, a, r, t.
 struct Node {
   float x, y, z, alpha_x, alpha_y;
@@ -58,9 +77,7 @@ Node node_at(double v, double a, double r, double t, double range) {
 class AlbedoBuilder {
  public:
   AlbedoBuilder(const Model& model, const AlbedoTable::Options& options)
-      : sizes_(options.sizes),
-        range_(albedo_range(model.distribution)),
-        values_(sizes_.total()) {
+      : sizes_(options.sizes), range_(albedo_range(model.distribution)), values_(sizes_.total()) {
     // Compensation, interface and retro-reflection play no part.
     batch_.model = {.distribution = model.distribution,
                     .masking = model.masking,
@@ -71,10 +88,11 @@ class AlbedoBuilder {
     const bool uneven = batch_.sampler != Sampler::exact && uses_u3(batch_.model, batch_.sampler);
     few_ = Points(options.samples * (uneven ? 4 : 1));
     many_ = Points(few_.u1.size() * 32);
+    disc_ = Disc(many_);
   }
 
   absl::StatusOr<std::vector<float>> run(const std::function<void(double)>& progress) {
-    Node node = node_at(0.5, 0.5, 0, 0, range_);
+    const Node node = node_at(0.5, 0.5, 0, 0, range_);
     if (auto status = facetwise::check(Operation::sample_reflection, with(node, few_)); !status.ok()) return status;
 
     const std::size_t cells = std::size_t{sizes_.ratio_v} * sizes_.ratio_a;
@@ -125,43 +143,26 @@ class AlbedoBuilder {
   }
   static float mean_weight(Batch batch, std::span<float> weights) {
     batch.out.weight = weights;
-    if (!run_one_thread(batch).ok()) return 0;
+    // Nothing of a node can be wrong where run() has checked one.
+    if (!facetwise::run(Operation::sample_reflection, batch, {.threads = Threads::one}).ok()) std::abort();
     double sum = 0;
     for (const float weight : weights) sum += weight;
     // Few samples may all be occluded; nothing is divided by 0.
     return std::max(static_cast<float>(sum / static_cast<double>(weights.size())), 1e-6f);
   }
-  static absl::StatusOr<Statistics> run_one_thread(const Batch& batch) {
-    return facetwise::run(Operation::sample_reflection, batch, {.threads = Threads::one});
-  }
 
-  // Directions spread by their cosine: a quarter disc, which is like the others, by points of its square.
   float mean_albedo(const Node& node) const {
-    thread_local std::vector<float> x, y, z, u1, u2, u3, weights;
-    for (auto* column : {&x, &y, &z, &u1, &u2, &u3}) column->clear();
-    for (std::size_t k = 0; k < many_.u1.size(); ++k) {
-      const double dx = Points::radical_inverse(k, 5), dy = Points::radical_inverse(k, 7), squared = dx * dx + dy * dy;
-      if (squared >= 1) continue;
-      x.push_back(static_cast<float>(dx));
-      y.push_back(static_cast<float>(dy));
-      z.push_back(static_cast<float>(std::sqrt(1 - squared)));
-      u1.push_back(many_.u1[k]);
-      u2.push_back(many_.u2[k]);
-      u3.push_back(many_.u3[k]);
-    }
-    weights.resize(x.size());
-    Batch batch = with(node, many_);
-    batch.lanes = x.size();
-    batch.incident = {x, y, z};
-    batch.u1 = u1;
-    batch.u2 = u2;
-    if (batch.u3.present()) batch.u3 = u3;
+    thread_local std::vector<float> weights;
+    weights.resize(disc_.points.u1.size());
+    Batch batch = with(node, disc_.points);
+    batch.incident = {disc_.x, disc_.y, disc_.z};
     return mean_weight(batch, weights);
   }
 
   AlbedoSizes sizes_;
   double range_;
   Points few_{0}, many_{0};
+  Disc disc_{many_};
   std::vector<float> values_;
   Batch batch_;
 };

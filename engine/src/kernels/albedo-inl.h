@@ -22,13 +22,16 @@ struct AlbedoPlace {
   using V = Vec<D>;
   V v, a, r, t;
 
-  // (x, y, z) in the axes of the roughness; z <= 0 is taken as 0.
-  HWY_INLINE AlbedoPlace(D d, const AlbedoTableView& table, V x, V y, V z, V alpha_x, V alpha_y) {
+  // z <= 0 is taken as 0.
+  template <class S, bool kFast>
+  HWY_INLINE AlbedoPlace(D d, const AlbedoTableView& table, const Inputs<D, S>& in,
+                         const Exceptions<D, kFast>& exceptions) {
+    const V alpha_x = exceptions.Computable(in.ax, 1.0f), alpha_y = exceptions.Computable(in.ay, 1.0f);
     const V one = Set(d, 1.0f), tiny = Set(d, 1e-30f);
     const V bounded_x = alpha_x / (one + alpha_x), bounded_y = alpha_y / (one + alpha_y);
-    x = Abs(x) * bounded_x;
-    y = Abs(y) * bounded_y;
-    z = Max(z, Zero(d));
+    const V x = Abs(exceptions.Computable(in.x, 0.0f)) * bounded_x;
+    const V y = Abs(exceptions.Computable(in.y, 0.0f)) * bounded_y;
+    const V z = Max(exceptions.Computable(in.z, 1.0f), Zero(d));
     const V horizontal2 = Fma(x, x, y * y), length = Sqrt(Fma(z, z, horizontal2));
     // v / (1 - v) = sqrt(c / (1 - c)), c = z / length.
     const V up = Sqrt(z * (length + z));
@@ -86,40 +89,22 @@ class AlbedoLookup {
   }
 };
 
-// What albedo and compensation read.
-template <class D, class S>
-struct AlbedoInputs {
-  using V = Vec<D>;
-  Inputs<D, S> in;
-  HWY_INLINE AlbedoInputs(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
-  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
-    return in.AllOrdinary(d, tile, lane, QuickTest<D>(d, in.x, in.y, in.z));
-  }
-  template <bool kFast>
-  HWY_INLINE AlbedoPlace<D> Place(D d, const Tile& tile, const Exceptions<D, kFast>& exceptions) const {
-    return {d,
-            *tile.albedo,
-            exceptions.Computable(in.x, 0.0f),
-            exceptions.Computable(in.y, 0.0f),
-            exceptions.Computable(in.z, 1.0f),
-            exceptions.Computable(in.ax, 1.0f),
-            exceptions.Computable(in.ay, 1.0f)};
-  }
-};
-
 // The operation albedo.
 template <class D, class S>
-struct AlbedoOf : AlbedoInputs<D, S> {
+struct AlbedoOf {
   using V = Vec<D>;
-  HWY_INLINE AlbedoOf(D d, const Tile& tile, std::size_t lane) : AlbedoInputs<D, S>(d, tile, lane) {}
+  IncidentInputs<D, S> in;
+
+  HWY_INLINE AlbedoOf(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const { return in.AllOrdinary(d, tile, lane); }
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V one = Set(d, 1.0f);
     LaneClasses<D> classes;
-    if constexpr (!kFast) classes = this->in.Classified(d, tile, lane, Not(NoLanes(d)));
+    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, classes);
-    const AlbedoPlace<D> place = this->Place(d, tile, exceptions);
+    const AlbedoPlace<D> place(d, *tile.albedo, in, exceptions);
     if (tile.wanted & bit(kOutAlbedo))
       Store(d, tile, kOutAlbedo, lane, exceptions.Output(AlbedoLookup<D>::Albedo(d, *tile.albedo, place), one));
     if (tile.wanted & bit(kOutMeanAlbedo))
@@ -131,20 +116,23 @@ struct AlbedoOf : AlbedoInputs<D, S> {
 // What compensation multiplies a lane's weight or value by, into Tile::factor: 1 + F0 (1 - E) / E (Turquin 2019).
 // 1 behind the surface.
 template <class D, class S>
-struct CompensationOf : AlbedoInputs<D, S> {
+struct CompensationOf {
   using V = Vec<D>;
-  HWY_INLINE CompensationOf(D d, const Tile& tile, std::size_t lane) : AlbedoInputs<D, S>(d, tile, lane) {}
+  IncidentInputs<D, S> in;
+
+  HWY_INLINE CompensationOf(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const { return in.AllOrdinary(d, tile, lane); }
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics&) const {
     const V one = Set(d, 1.0f);
     LaneClasses<D> classes;
-    if constexpr (!kFast) classes = this->in.Classified(d, tile, lane, Not(NoLanes(d)));
+    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, classes);
-    const V albedo = AlbedoLookup<D>::Albedo(d, *tile.albedo, this->Place(d, tile, exceptions));
+    const V albedo = AlbedoLookup<D>::Albedo(d, *tile.albedo, {d, *tile.albedo, in, exceptions});
     V lost = (one - albedo) / albedo;
     if (tile.interface == Interface::schlick) lost = lost * InterfaceInputs<D>(d, tile, lane).f0;
-    lost = IfThenElseZero(this->in.z > Zero(d), lost);
+    lost = IfThenElseZero(in.z > Zero(d), lost);
     StoreU(exceptions.Output(one + lost, one), d, tile.factor + lane);
   }
 };

@@ -81,6 +81,18 @@ struct Inputs {
   }
 };
 
+// What operations read that know no other direction and no random numbers.
+template <class D, class S>
+struct IncidentInputs : Inputs<D, S> {
+  HWY_INLINE IncidentInputs(D d, const Tile& tile, std::size_t lane) : Inputs<D, S>(d, tile, lane) {}
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
+    return Inputs<D, S>::AllOrdinary(d, tile, lane, QuickTest<D>(d, this->x, this->y, this->z));
+  }
+  HWY_INLINE LaneClasses<D> Classified(D d, const Tile& tile, std::size_t lane) const {
+    return Inputs<D, S>::Classified(d, tile, lane, Not(NoLanes(d)));
+  }
+};
+
 // What samples read besides.
 template <class D, class S, bool kUsesU3>
 struct SampleInputs : Inputs<D, S> {

@@ -81,18 +81,16 @@ struct Query {
 template <class D, class S>
 struct MaskingOf {
   using V = Vec<D>;
-  Inputs<D, S> in;
+  IncidentInputs<D, S> in;
 
   HWY_INLINE MaskingOf(D d, const Tile& tile, std::size_t lane) : in(d, tile, lane) {}
-  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const {
-    return in.AllOrdinary(d, tile, lane, QuickTest<D>(d, in.x, in.y, in.z));
-  }
+  HWY_INLINE bool AllOrdinary(D d, const Tile& tile, std::size_t lane) const { return in.AllOrdinary(d, tile, lane); }
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
     LaneClasses<D> classes;
-    if constexpr (!kFast) classes = in.Classified(d, tile, lane, Not(NoLanes(d)));
+    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
     const Exceptions<D, kFast> exceptions(d, classes);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     // A mirror masks nothing in front of it, and shows nothing to what is behind.

@@ -1,8 +1,6 @@
 // Tables as bytes and files, and slopes as text.
 //
-// The bytes: 8 of magic, the version and the six sizes of TableSizes as uint32, 4 bytes of 0, the values as
-// float32, and the FNV-1a hash of all before as uint64; little-endian.
-#include <bit>
+// The bytes (sealed.h): 8 of magic, the version and the six sizes of TableSizes as uint32, 4 bytes of 0, the values.
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -11,15 +9,13 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/slope_table.h"
 #include "src/table/layout.h"
+#include "src/table/sealed.h"
 #include "src/whole_file.h"
 
 namespace facetwise {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "values are written as they lie in memory");
-
-constexpr char kMagic[] = {'f', 'w', 's', 'l', 'o', 'p', 'e', '\x1a'};
-constexpr std::uint32_t kVersion = 1;
+constexpr Seal kSeal = {{'f', 'w', 's', 'l', 'o', 'p', 'e', '\x1a'}, 1, "slopes", "SlopeTable"};
 struct Header {
   char magic[8];
   std::uint32_t version;
@@ -88,37 +84,16 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> build_text(std::string_view te
 }  // namespace
 
 std::string SlopeTable::serialise() const {
-  Header header{{}, kVersion, SlopeTableMaker::sizes(*this), 0};
-  std::memcpy(header.magic, kMagic, sizeof kMagic);
-  std::string bytes(reinterpret_cast<const char*>(&header), sizeof header);
-  bytes.append(reinterpret_cast<const char*>(values_.data()), this->bytes());
-  const std::uint64_t hash = fnv1a(bytes.data(), bytes.size());
-  bytes.append(reinterpret_cast<const char*>(&hash), sizeof hash);
-  return bytes;
+  Header header{{}, kSeal.version, SlopeTableMaker::sizes(*this), 0};
+  std::memcpy(header.magic, kSeal.magic, sizeof kSeal.magic);
+  return seal(header, values_);
 }
 
 absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::parse(std::string_view bytes) {
-  Header header;
-  std::uint64_t hash;
-  if (bytes.size() < sizeof kMagic || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
-    return invalid("not a table of slopes; make one with SlopeTable::save");
-  if (bytes.size() < sizeof header + sizeof hash)
-    return invalid("truncated: ", bytes.size(), " bytes; copy it again or rebuild it");
-  std::memcpy(&header, bytes.data(), sizeof header);
-  if (header.version != kVersion)
-    return invalid("version ", header.version, "; this facetwise reads version ", kVersion, ": rebuild the table");
-  if (auto status = check_sizes(header.sizes); !status.ok())
-    return invalid("corrupted (", status.message(), "); copy it again or rebuild it");
-  const std::size_t size = sizeof header + header.sizes.total() * sizeof(float) + sizeof hash;
-  if (bytes.size() < size)
-    return invalid("truncated: ", bytes.size(), " bytes of ", size, "; copy it again or rebuild it");
-  if (bytes.size() > size)
-    return invalid("corrupted: ", bytes.size(), " bytes instead of ", size, "; copy it again or rebuild it");
-  std::memcpy(&hash, bytes.data() + size - sizeof hash, sizeof hash);
-  if (header.zero != 0 || hash != fnv1a(bytes.data(), size - sizeof hash))
-    return invalid("corrupted: its hash is another; copy it again or rebuild it");
-  std::vector<float> values(header.sizes.total());
-  std::memcpy(values.data(), bytes.data() + sizeof header, values.size() * sizeof(float));
+  auto unsealed = unseal<Header>(bytes, kSeal);
+  if (!unsealed.ok()) return unsealed.status();
+  auto& [header, values] = *unsealed;
+  if (header.zero != 0) return corrupted_by_hash();
   if (auto status = check_values(header.sizes, values); !status.ok()) return status;
   return SlopeTableMaker::make(header.sizes, std::move(values));
 }
@@ -126,18 +101,14 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::parse(std::string_
 absl::Status SlopeTable::save(const std::string& path) const { return replace_file(path, serialise()); }
 
 absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::load(const std::string& path) {
-  const auto bytes = read_file(path);
-  if (!bytes.ok()) return bytes.status();
-  auto table = parse(*bytes);
-  if (!table.ok()) return of_file(path, table.status());
-  return table;
+  return load_table<SlopeTable>(path);
 }
 
 absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::load_any(const std::string& path,
                                                                        const Options& options) {
   const auto bytes = read_file(path);
   if (!bytes.ok()) return bytes.status();
-  if (bytes->rfind(kMagic, 0, sizeof kMagic) != 0 && bytes->rfind(kTextMagic, 0) != 0)
+  if (bytes->rfind(kSeal.magic, 0, sizeof kSeal.magic) != 0 && bytes->rfind(kTextMagic, 0) != 0)
     return invalid(path, ": neither a saved table nor text that begins with \"", kTextMagic, "\"");
   auto table = bytes->rfind(kTextMagic, 0) == 0 ? build_text(*bytes, options) : parse(*bytes);
   if (!table.ok()) return of_file(path, table.status());
