@@ -24,5 +24,6 @@ Verb add_bench(CLI::App& app);
 Verb add_info(CLI::App& app);
 Verb add_summary(CLI::App& app);
 Verb add_table(CLI::App& app);
+Verb add_render(CLI::App& app);
 
 }  // namespace facetwise::app

@@ -8,8 +8,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/scene.h"
+#include "facetwise/vector.h"
 #include "src/material.h"
-#include "src/vector.h"
 
 namespace facetwise::scene {
 namespace {
@@ -26,16 +26,6 @@ struct Hit {
   Vector incident;
   Roughness alpha;
 };
-
-// The local frame of a normal: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
-Vector to_local(Vector n, Vector direction) {
-  const float sign = std::copysign(1.0f, n[2]);
-  const float a = -1.0f / (sign + n[2]);
-  const float b = n[0] * n[1] * a;
-  const Vector tangent = {1.0f + sign * n[0] * n[0] * a, sign * b, -sign * n[0]};
-  const Vector bitangent = {b, sign + n[1] * n[1] * a, -n[1]};
-  return normalized({dot(tangent, direction), dot(bitangent, direction), dot(n, direction)});
-}
 
 }  // namespace
 
@@ -116,7 +106,7 @@ struct Camera::State {
     if (dot(normal, facing) < 0.0f) normal = -1.0f * normal;
     const Vector point = (1.0f / size) * (eye + query.ray.tfar * direction - center);
     const Vector shading = bend_normal(point, normalized(normal));
-    hit = {to_local(shading, -1.0f * direction), roughness(point, mesh.parts[query.hit.primID])};
+    hit = {normalized(Frame(shading).to_local(-1.0f * direction)), roughness(point, mesh.parts[query.hit.primID])};
     return true;
   }
 

@@ -28,6 +28,12 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
       normal.NormalizeSafe();
       mesh.positions.push_back({position.x, position.y, position.z});
       mesh.normals.push_back({normal.x, normal.y, normal.z});
+      const aiVector3D tangent =
+          source.HasTangentsAndBitangents() ? aiMatrix3x3(transform) * source.mTangents[v] : aiVector3D(0, 0, 0);
+      mesh.tangents.push_back({tangent.x, tangent.y, tangent.z});
+      // assimp has v grow upwards.
+      const aiVector3D at = source.HasTextureCoords(0) ? source.mTextureCoords[0][v] : aiVector3D(0, 1, 0);
+      mesh.texcoords.push_back({at.x, 1 - at.y});
     }
     for (unsigned f = 0; f < source.mNumFaces; ++f) {
       const aiFace& face = source.mFaces[f];
@@ -41,10 +47,11 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
 
 }  // namespace
 
-absl::StatusOr<Mesh> load_mesh(const std::string& path) {
+absl::StatusOr<Mesh> load_mesh(const std::string& path, bool tangents) {
   Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_GenSmoothNormals |
-                                                     aiProcess_JoinIdenticalVertices | aiProcess_SortByPType);
+  const aiScene* scene =
+      importer.ReadFile(path, aiProcess_Triangulate | aiProcess_GenSmoothNormals | aiProcess_JoinIdenticalVertices |
+                                  aiProcess_SortByPType | (tangents ? aiProcess_CalcTangentSpace : 0u));
   if (scene == nullptr || scene->mRootNode == nullptr)
     return absl::InvalidArgumentError(absl::StrCat(path, ": ", importer.GetErrorString()));
   Mesh mesh;

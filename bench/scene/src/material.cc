@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/vector.h"
+#include "facetwise/vector.h"
 
 namespace facetwise::scene {
 namespace {

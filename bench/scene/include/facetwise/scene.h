@@ -8,20 +8,21 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "facetwise/vector.h"
 
 namespace facetwise::scene {
-
-using Vector = std::array<float, 3>;
 
 // Triangles with vertex normals, in world space: a file's instances are resolved.
 struct Mesh {
   std::vector<Vector> positions, normals;               // per vertex
   std::vector<std::array<std::uint32_t, 3>> triangles;  // vertices
   std::vector<std::uint32_t> parts;                     // per triangle: which of the file's meshes it is of
+  std::vector<Vector> tangents;                         // per vertex, of any length, 0 where unknown; may be empty
+  std::vector<std::array<float, 2>> texcoords;          // per vertex, v grows downwards; may be empty
 };
 
-// Reads any format that assimp knows. Errors begin with the path.
-absl::StatusOr<Mesh> load_mesh(const std::string& path);
+// Reads any format that assimp knows; tangents, if wanted, from the texture coordinates. Errors begin with the path.
+absl::StatusOr<Mesh> load_mesh(const std::string& path, bool tangents = false);
 
 // 2CylinderEngine.glb of Debian's assimp-testmodels, or NotFound where it is not installed.
 absl::StatusOr<std::string> default_mesh();
