@@ -22,7 +22,7 @@ namespace {
 std::atomic<bool> stopped = false;
 
 struct RenderVerb {
-  std::string scene = "orbs", environment = "studio", output, png;
+  std::string scene = "orbs", environment = "courtyard", output, png;
   ModelArguments model;
   EngineArguments engine;
   render::Settings settings;
@@ -149,7 +149,7 @@ Examples:
   command
       .add_option(
           "--environment", arguments->environment,
-          "Light: a probe of Debian's blender-data (studio, the default, city, forest ...), an EXR file, or white")
+          "Light: a probe of Debian's blender-data (courtyard, the default, city, studio ...), an EXR file, or white")
       ->option_text("NAME|FILE");
   command.add_option("--output", arguments->output, "The picture as EXR")->option_text("FILE");
   command.add_option("--png", arguments->png, "The picture as PNG, tone-mapped")->option_text("FILE");

@@ -25,5 +25,6 @@ Verb add_info(CLI::App& app);
 Verb add_summary(CLI::App& app);
 Verb add_table(CLI::App& app);
 Verb add_render(CLI::App& app);
+Verb add_experiment(CLI::App& app);
 
 }  // namespace facetwise::app

@@ -161,14 +161,35 @@ absl::Status save_png(const Picture& picture, const std::string& path, float exp
   return file ? absl::OkStatus() : absl::UnavailableError(absl::StrCat(path, ": cannot be written"));
 }
 
-double rmse(const Picture& a, const Picture& b) {
+double rmse(const Picture& a, const Picture& b, double first, double last) {
+  const auto begin = static_cast<std::size_t>(std::lround(first * a.width));
+  const auto end = static_cast<std::size_t>(std::lround(last * a.width));
+  const auto width = static_cast<std::size_t>(a.width);
   double sum = 0;
-  const std::size_t pixels = std::min(a.pixels.size(), b.pixels.size());
-  for (std::size_t k = 0; k < pixels; ++k) {
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < std::min(a.pixels.size(), b.pixels.size()); ++k) {
+    if (k % width < begin || k % width >= end) continue;
     const Color x = a.color(k), y = b.color(k);
     for (std::size_t c = 0; c < 3; ++c) sum += (x[c] - y[c]) * static_cast<double>(x[c] - y[c]);
+    ++count;
   }
-  return std::sqrt(sum / (3.0 * static_cast<double>(std::max<std::size_t>(1, pixels))));
+  return std::sqrt(sum / (3.0 * static_cast<double>(std::max<std::size_t>(1, count))));
+}
+
+Picture merge(const Picture& a, const Picture& b) {
+  Picture both = a;
+  for (std::size_t k = 0; k < both.pixels.size(); ++k) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      both.pixels[k].radiance[c].add(b.pixels[k].radiance[c].high);
+      both.pixels[k].radiance[c].add(b.pixels[k].radiance[c].low);
+    }
+    both.pixels[k].samples += b.pixels[k].samples;
+    both.pixels[k].rejected += b.pixels[k].rejected;
+    both.pixels[k].surfaces += b.pixels[k].surfaces;
+  }
+  both.sampled += b.sampled;
+  both.paths += b.paths;
+  return both;
 }
 
 }  // namespace facetwise::render

@@ -155,8 +155,11 @@ absl::Status save_png(const Picture& picture, const std::string& path, float exp
 std::string png_bytes(int width, int height, const std::vector<std::uint8_t>& rgb);
 std::vector<std::uint8_t> tone_map(const Picture& picture, float exposure = 1, bool filmic = true);
 
-// Root of the mean square difference of two pictures' colours, over all channels.
-double rmse(const Picture& a, const Picture& b);
+// Root of the mean square difference of two pictures' colours, over all channels and the columns of pixels in
+// [first, last), given as shares of the width.
+double rmse(const Picture& a, const Picture& b, double first = 0, double last = 1);
+// The picture of both's samples together.
+Picture merge(const Picture& a, const Picture& b);
 
 // --- Scenes ---------------------------------------------------------------------------------------------------------
 

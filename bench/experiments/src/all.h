@@ -1,0 +1,12 @@
+// The experiments, one page each.
+#pragma once
+
+#include "absl/status/statusor.h"
+#include "facetwise/experiments.h"
+
+namespace facetwise::experiments {
+
+absl::StatusOr<Page> bounded_page(const Options& options);
+absl::StatusOr<Page> wasted_page(const Options& options);
+
+}  // namespace facetwise::experiments
