@@ -14,10 +14,13 @@ On a Debian 12 machine, from nothing to a measured result:
   4. sends it batches of 1,048,576 lanes of every model, traced with Embree at a mesh, recomputes every answer here and
      compares every byte (`facetwise verify`);
   5. runs a short benchmark, scalar, SIMD, threads and remote (`facetwise bench`);
-  6. prints a summary.
+  6. runs the texts' experiments, small (`facetwise experiment --quick`);
+  7. prints a summary and makes a page of it all.
 
-Writes  out/report.json  the benchmark's results
+Writes  out/report.html  the page, for a browser
+        out/report.json  the benchmark's results
         out/verify.json  the comparison, batch by batch
+        out/experiments  the experiments, a page each as JSON
         out/*.log        what each step printed
 Exit code: 0 if every byte is equal and every step worked.
 EOF
@@ -79,8 +82,15 @@ rm -f out/verify.json out/report.json
 logged verify "$facetwise" verify --remote "$address" --json out/verify.json
 say "benchmark: a minute and a half (out/bench.log)"
 logged bench "$facetwise" bench --quick --remote "$address" --json out/report.json
+say "experiments: two minutes (out/experiments.log)"
+rm -rf out/experiments
+logged experiments "$facetwise" experiment --quick --folder out/experiments
+logged report "$facetwise" report --bench out/report.json --verification out/verify.json --folder out/experiments \
+  --output out/report.html --command "facetwise verify --remote unix:PATH --json out/verify.json" \
+  --command "facetwise bench --quick --remote unix:PATH --json out/report.json"
 say "done"
 echo
 "$facetwise" summary --report out/report.json --verification out/verify.json
 echo
-echo "Results: out/report.json, out/verify.json. Full tables: out/bench.log."
+echo "Look at it: out/report.html. Results: out/report.json, out/verify.json. Full tables: out/bench.log."
+echo "The experiments' claims, measured: out/experiments.log; in full: facetwise experiment (most of an hour)."

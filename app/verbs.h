@@ -26,5 +26,6 @@ Verb add_summary(CLI::App& app);
 Verb add_table(CLI::App& app);
 Verb add_render(CLI::App& app);
 Verb add_experiment(CLI::App& app);
+Verb add_report(CLI::App& app);
 
 }  // namespace facetwise::app
