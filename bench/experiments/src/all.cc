@@ -6,7 +6,11 @@ namespace facetwise::experiments {
 
 std::vector<Experiment> all_experiments() {
   return {{"wasted", "Wasted samples and the range of weights", wasted_page},
-          {"bounded", "Bounded and exact sampling of reflections", bounded_page}};
+          {"bounded", "Bounded and exact sampling of reflections", bounded_page},
+          {"backfacing", "Shading normals that face away", backfacing_page},
+          {"convergence", "Visible normals: convergence, and rough glass", convergence_page},
+          {"retro", "Reflecting back: the back vector", retro_page},
+          {"relief", "A displaced surface from afar", relief_page}};
 }
 
 }  // namespace facetwise::experiments

@@ -14,22 +14,6 @@ namespace {
 constexpr Sampler kSamplers[] = {Sampler::cap, Sampler::bounded, Sampler::exact};
 constexpr double kPi = std::numbers::pi;
 
-std::string text(std::string_view view) { return std::string(view); }
-std::string percent(double share) { return fmt::format("{:.2f} %", 100 * share); }
-double share_rejected(const render::Picture& picture) {
-  return static_cast<double>(picture.sampled.occluded) /
-         static_cast<double>(std::max<std::uint64_t>(1, picture.sampled.lanes()));
-}
-
-absl::StatusOr<render::Scene> lit(std::string_view name) {
-  auto scene = render::built_in_scene(name);
-  if (!scene.ok()) return scene;
-  auto environment = render::load_environment("courtyard");
-  if (!environment.ok()) return environment.status();
-  scene->environment = *std::move(environment);
-  return scene;
-}
-
 void use(render::Scene& scene, Sampler sampler) {
   for (auto& material : scene.materials) material.sampler = sampler;
 }
@@ -121,7 +105,6 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
   if (!truth.ok()) return truth.status();
 
   // Figure 1.
-  constexpr double kAlpha[] = {0.01, 0.1, 0.3, 0.6, 1};
   Table table{"Five orbs, 8 samples a pixel",
               {"numbers", "light", "sampler", "RMSE", "α 0.01", "α 0.1", "α 0.3", "α 0.6", "α 1", "rejected",
                "surfaces a path", "seconds"},
@@ -273,37 +256,36 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
     page.figures.emplace_back(std::move(plot));
   }
 
-  const auto verdict = [](bool yes) { return yes ? Verdict::agrees : Verdict::differs; };
   page.claims.push_back(
       {"Bounded sampling reduces noise compared with the spherical cap, especially for rough surfaces (figure 1).",
        fmt::format("RMSE of all five orbs {:.4f} with cap, {:.4f} with bounded; at alpha = 1 {:.4f} and {:.4f}, at "
                    "0.01 {:.4f} and {:.4f}.",
                    error(Sampler::cap), error(Sampler::bounded), error(Sampler::cap, 4), error(Sampler::bounded, 4),
                    error(Sampler::cap, 0), error(Sampler::bounded, 0)),
-       verdict(error(Sampler::bounded) < error(Sampler::cap) &&
-               error(Sampler::bounded, 4) / error(Sampler::cap, 4) <
-                   error(Sampler::bounded, 0) / error(Sampler::cap, 0))});
+       agrees(error(Sampler::bounded) < error(Sampler::cap) &&
+              error(Sampler::bounded, 4) / error(Sampler::cap, 4) <
+                  error(Sampler::bounded, 0) / error(Sampler::cap, 0))});
   const double depth = main.at(Sampler::bounded).picture.mean_depth() - main.at(Sampler::cap).picture.mean_depth();
   page.claims.push_back(
       {"It makes paths longer, since fewer end at a rejected sample (figure 1).",
        fmt::format("{:.4f} surfaces a path with cap, {:.4f} with bounded, {:.4f} with exact.",
                    main.at(Sampler::cap).picture.mean_depth(), main.at(Sampler::bounded).picture.mean_depth(),
                    main.at(Sampler::exact).picture.mean_depth()),
-       verdict(depth > 0)});
+       agrees(depth > 0)});
   page.claims.push_back(
       {"The time that this costs is small beside the gain (section 4).",
        fmt::format("In the time that cap takes, bounded comes to {:.3f} and exact to {:.3f} times its RMSE.",
                    equal_time[Sampler::bounded], equal_time[Sampler::exact]),
-       verdict(equal_time[Sampler::bounded] < 1)});
+       agrees(equal_time[Sampler::bounded] < 1)});
   page.claims.push_back({"At alpha = 0.8 the gain is clear, at 0.2 insignificant (figure 4).",
                          fmt::format("Bounded's RMSE is {:.3f} of cap's at 0.8 and {:.3f} at 0.2.",
                                      rough[Sampler::bounded] / rough[Sampler::cap], smooth_gain),
-                         verdict(rough[Sampler::bounded] / rough[Sampler::cap] < smooth_gain)});
+                         agrees(rough[Sampler::bounded] / rough[Sampler::cap] < smooth_gain)});
   page.claims.push_back(
       {"The gain is larger for low anisotropy (figures 5 and 6).",
        fmt::format("With alpha_y = 1, bounded's RMSE is {:.3f} of cap's at alpha_x = 0.8 and {:.3f} at 0.1.",
                    low_anisotropy, high_anisotropy),
-       verdict(low_anisotropy < high_anisotropy)});
+       agrees(low_anisotropy < high_anisotropy)});
   page.claims.push_back(
       {"A method that avoids all occluded reflections is left for future work (section 4).",
        fmt::format(
@@ -313,7 +295,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
            percent(share_rejected(main.at(Sampler::bounded).picture)),
            percent(share_rejected(main.at(Sampler::cap).picture)), error(Sampler::exact) / error(Sampler::bounded),
            equal_time[Sampler::exact] / equal_time[Sampler::bounded]),
-       verdict(main.at(Sampler::exact).picture.sampled.occluded == 0)});
+       agrees(main.at(Sampler::exact).picture.sampled.occluded == 0)});
   page.notes = {
       "The text's orb model and light probe are not free; ours are an orb of revolution and the courtyard of Blender's "
       "light probes. The numbers are therefore ours, the comparison the same.",
@@ -321,7 +303,6 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
       "(as "
       "renderers do), the samplers differ less: both are in the tables.",
       "Energy compensation after Turquin 2019, as in the text, by the engine's tables of albedo."};
-  (void)kAlpha;
   return page;
 }
 

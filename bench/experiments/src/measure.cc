@@ -1,5 +1,7 @@
 #include "src/measure.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -17,6 +19,22 @@ std::function<bool(double)> Steps::inside() {
   return [this](double done) {
     return !options_.progress || options_.progress(what_, std::min(1.0, (done_ + done * weight_) / total_));
   };
+}
+
+std::string percent(double share) { return fmt::format("{:.2f} %", 100 * share); }
+
+double share_rejected(const render::Picture& picture) {
+  return static_cast<double>(picture.sampled.occluded) /
+         static_cast<double>(std::max<std::uint64_t>(1, picture.sampled.lanes()));
+}
+
+absl::StatusOr<render::Scene> lit(std::string_view name) {
+  auto scene = render::built_in_scene(name);
+  if (!scene.ok()) return scene;
+  auto environment = render::load_environment("courtyard");
+  if (!environment.ok()) return environment.status();
+  scene->environment = *std::move(environment);
+  return scene;
 }
 
 absl::StatusOr<render::Picture> render_here(const render::Scene& scene, render::Settings settings, Steps& steps) {

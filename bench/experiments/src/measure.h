@@ -27,6 +27,13 @@ class Steps {
   std::string what_;
 };
 
+inline std::string text(std::string_view view) { return std::string(view); }
+std::string percent(double share);  // "1.86 %"
+inline Verdict agrees(bool yes) { return yes ? Verdict::agrees : Verdict::differs; }
+double share_rejected(const render::Picture& picture);
+// A scene made by code, in the light probe that all experiments use: with much contrast, but without a sun.
+absl::StatusOr<render::Scene> lit(std::string_view name);
+
 // Renders here, on all cores. Cancelled if it was stopped.
 absl::StatusOr<render::Picture> render_here(const render::Scene& scene, render::Settings settings, Steps& steps);
 

@@ -16,8 +16,6 @@ namespace {
 constexpr Sampler kSamplers[] = {Sampler::ndf, Sampler::visible, Sampler::exact};
 constexpr double kPi = std::numbers::pi;
 
-std::string text(std::string_view view) { return std::string(view); }
-
 struct Weights {
   double wasted = 0;
   double largest = 0, high = 0, median = 0, second_moment = 0;  // of accepted samples; `high`: 99.9 % lie below
@@ -136,11 +134,8 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
   page.figures.emplace_back(std::move(post));
 
   // Its three comparisons of pictures: the old way beside the new, at three roughnesses.
-  auto scene = render::built_in_scene("orb");
+  auto scene = lit("orb");
   if (!scene.ok()) return scene.status();
-  auto environment = render::load_environment("courtyard");
-  if (!environment.ok()) return environment.status();
-  scene->environment = *std::move(environment);
   std::map<Sampler, double> errors;
   for (const float alpha : {0.1f, 0.3f, 0.6f}) {
     if (auto status = steps.begin(fmt::format("pictures at alpha {}", alpha), 6); !status.ok()) return status;
@@ -179,7 +174,6 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
     page.figures.emplace_back(std::move(pictures));
   }
 
-  const auto verdict = [](bool yes) { return yes ? Verdict::agrees : Verdict::differs; };
   const auto& ndf = all[{Sampler::ndf, 0.3f}];
   const auto& visible = all[{Sampler::visible, 0.3f}];
   page.claims.push_back(
@@ -188,7 +182,7 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
            "At alpha = 0.3, ndf wastes {:.1f} % at 60° and {:.1f} % at 89.5°; visible normals {:.1f} % and {:.1f} %.",
            100 * ndf.at(60).wasted, 100 * ndf.at(89.5).wasted, 100 * visible.at(60).wasted,
            100 * visible.at(89.5).wasted),
-       verdict(ndf.at(89.5).wasted > visible.at(89.5).wasted)});
+       agrees(ndf.at(89.5).wasted > visible.at(89.5).wasted)});
   double largest = 0;
   for (const float alpha : kAlpha)
     for (const auto& [theta, w] : all[{Sampler::ndf, alpha}]) largest = std::max(largest, w.largest);
@@ -206,7 +200,7 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
        fmt::format("With 730 samples at alpha = 1.26, {:.0f} and {:.0f} are wasted (the post gives neither number; "
                    "these fit best), with exact {:.0f}.",
                    at_grazing[Sampler::visible], at_grazing[Sampler::ndf], at_grazing[Sampler::exact]),
-       verdict(std::abs(at_grazing[Sampler::visible] - 61) < 20 && std::abs(at_grazing[Sampler::ndf] - 371) < 40)});
+       agrees(std::abs(at_grazing[Sampler::visible] - 61) < 20 && std::abs(at_grazing[Sampler::ndf] - 371) < 40)});
   page.claims.push_back(
       {"At pi / 4 there are 52 invalid samples, as far as 3 pi / 4 from the normal: the author guesses at numerical "
        "errors.",
@@ -218,7 +212,7 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
       {"Pictures by visible normals have less noise at equal samples.",
        fmt::format("At alpha = 0.3 the RMSE is {:.4f} with ndf, {:.4f} with visible normals, {:.4f} with exact.",
                    errors[Sampler::ndf], errors[Sampler::visible], errors[Sampler::exact]),
-       verdict(errors[Sampler::visible] < errors[Sampler::ndf])});
+       agrees(errors[Sampler::visible] < errors[Sampler::ndf])});
   page.notes = {
       "The post's pictures show a scene that is not given; ours is an orb in the courtyard of Blender's light probes.",
       "Light is found by reflection alone, so that the sampler is all that differs."};

@@ -46,6 +46,7 @@ struct Group {
   Model model;
   Sampler sampler;
   bool compensated;
+  bool sloped;  // has mean slopes
   bool dielectric() const { return model.interface == Interface::dielectric; }
 };
 
@@ -69,6 +70,27 @@ float schlick(float f0, float im) {
   return f0 + (1 - f0) * c2 * c2 * c;
 }
 
+// Directions through points of the picture, in pixels from its upper left corner.
+class Camera {
+ public:
+  Camera(const View& view, int width, int height)
+      : size_(view.field / static_cast<float>(height)),
+        middle_x_(0.5f * static_cast<float>(width)),
+        middle_y_(0.5f * static_cast<float>(height)) {
+    const Vector back = normalized(view.eye - view.target);
+    right_ = normalized(cross(view.up, back));
+    up_ = cross(back, right_);
+    forward_ = -1.0f * back;
+  }
+  Vector direction(float x, float y) const {
+    return normalized(forward_ + (size_ * (x - middle_x_)) * right_ - (size_ * (y - middle_y_)) * up_);
+  }
+
+ private:
+  float size_, middle_x_, middle_y_;
+  Vector right_{}, up_{}, forward_{};
+};
+
 class Renderer {
  public:
   Renderer(const Scene& scene, const Settings& settings, Engine& engine, Geometry& geometry, Picture& picture)
@@ -77,10 +99,12 @@ class Renderer {
         engine_(engine),
         geometry_(geometry),
         picture_(picture),
-        light_(scene.environment) {
+        light_(scene.environment),
+        camera_(scene.view, picture.width, picture.height) {
     for (const Material& material : scene.materials) {
       const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const Group& group) {
         return group.sampler == material.sampler && group.compensated == material.compensated &&
+               group.sloped == (material.slopes != nullptr) &&
                group.model.distribution == material.model.distribution &&
                group.model.masking == material.model.masking && group.model.shadowing == material.model.shadowing &&
                group.model.normalisation == material.model.normalisation &&
@@ -88,17 +112,14 @@ class Renderer {
                group.model.table == material.model.table;
       });
       group_of_.push_back(static_cast<std::uint8_t>(same - groups_.begin()));
-      if (same == groups_.end()) groups_.push_back({material.model, material.sampler, material.compensated});
+      if (same == groups_.end())
+        groups_.push_back({material.model, material.sampler, material.compensated, material.slopes != nullptr});
     }
     Vector low = scene.mesh.positions[0], high = low;
     for (const Vector& p : scene.mesh.positions)
       for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
     const Vector size = high - low;
     step_ = 1e-5f * std::sqrt(dot(size, size));
-    const Vector back = normalized(scene.view.eye - scene.view.target);
-    right_ = normalized(cross(scene.view.up, back));
-    up_ = cross(back, right_);
-    forward_ = -1.0f * back;
   }
 
   std::size_t groups() const { return groups_.size(); }
@@ -144,7 +165,7 @@ class Renderer {
     if (lanes <= capacity_) return;
     capacity_ = lanes;
     std::size_t next = 0;
-    memory_ = ColumnMemory(56, lanes);
+    memory_ = ColumnMemory(59, lanes);
     const auto column = [&] { return memory_[next++]; };
     const auto vectors = [&] { return Vectors{column(), column(), column()}; };
     for (Paths* paths : {&now_, &next_}) {
@@ -155,29 +176,27 @@ class Renderer {
     incident_ = vectors(), outgoing_ = vectors(), towards_light_ = vectors();
     shadow_origin_ = vectors(), shadow_direction_ = vectors(), from_light_ = vectors();
     for (float** one : {&u_, &v_, &distance_, &alpha_x_, &alpha_y_, &eta_, &u1_, &u2_, &u3_, &pdf_, &weight_, &value_,
-                        &im_, &light_pdf_, &albedo_})
+                        &im_, &light_pdf_, &albedo_, &mean_slope_x_, &mean_slope_y_, &slope_correlation_})
       *one = column();
     triangle_.resize(lanes);
     group_.resize(lanes), status_.resize(lanes), event_.resize(lanes), visible_.resize(lanes);
     id_.resize(lanes), index_.resize(lanes);
-    surface_.resize(lanes, Surface{{}, {}, scene::Frame({0, 0, 1}), true});
+    surface_.resize(lanes, Surface{{}, {}, scene::Frame({0, 0, 1}), true, {}});
     radiance_.resize(lanes), surfaces_.resize(lanes), rejected_.resize(lanes);
   }
 
   // Rays from the eye.
   void start(std::size_t lanes) {
     const auto width = static_cast<std::uint32_t>(picture_.width);
-    const float size = scene_.view.field / static_cast<float>(picture_.height);
     for_lanes(lanes, [&](std::size_t begin, std::size_t end) {
       for (std::size_t lane = begin; lane < end; ++lane) {
         const auto slot = static_cast<std::uint32_t>(lane);
         const auto u = numbers(slot, kPlaceInPixel);
         const std::uint32_t at = pixel(slot);
-        const float x = static_cast<float>(at % width) + u[0] - 0.5f * static_cast<float>(picture_.width);
-        const float y = static_cast<float>(at / width) + u[1] - 0.5f * static_cast<float>(picture_.height);
         now_.slot[lane] = slot;
         now_.origin.set(lane, scene_.view.eye);
-        now_.direction.set(lane, normalized(forward_ + (size * x) * right_ - (size * y) * up_));
+        now_.direction.set(
+            lane, camera_.direction(static_cast<float>(at % width) + u[0], static_cast<float>(at / width) + u[1]));
         now_.throughput.set(lane, {1, 1, 1});
         now_.pdf[lane] = 0;
       }
@@ -220,6 +239,7 @@ class Renderer {
         incident_.set(lane, normalized(i));
         alpha_x_[lane] = here.alpha_x;
         alpha_y_[lane] = here.alpha_y;
+        if (here.slopes) set_slopes(lane, here, distance_[lane]);
         eta_[lane] = surface.entering ? here.eta : 1 / here.eta;
         id_[lane] = std::uint64_t{sample(slot)} * picture_.pixels.size() + pixel(slot);
         if (settings_.numbers != Numbers::random) {
@@ -229,6 +249,26 @@ class Renderer {
         group_[lane] = group_of_[scene_.mesh.parts[triangle_[lane]]];
       }
     });
+  }
+
+  // Mean slopes and roughness over the path's footprint, as from the eye: that of a pixel, along its shorter side (its
+  // samples spread over the longer one).
+  void set_slopes(std::size_t lane, const Material& here, float distance) {
+    const Surface& surface = surface_[lane];
+    const SlopeMap& map = *here.slopes;
+    const auto side = static_cast<float>(map.side());
+    const float pixel = distance * scene_.view.field / static_cast<float>(picture_.height);
+    const auto slope =
+        map.at(surface.texcoord[0] * side, (1 - surface.texcoord[1]) * side, std::log2(std::max(1.0f, pixel * side)));
+    const float relief = here.mean_slopes_only ? 0.0f : 2.0f;  // alpha^2 of Beckmann is twice the slopes' variance
+    const float xx = relief * std::max(0.0f, slope.xx - slope.x * slope.x) + here.alpha_x * here.alpha_x;
+    const float yy = relief * std::max(0.0f, slope.yy - slope.y * slope.y) + here.alpha_y * here.alpha_y;
+    alpha_x_[lane] = std::sqrt(xx);
+    alpha_y_[lane] = std::sqrt(yy);
+    mean_slope_x_[lane] = slope.x;
+    mean_slope_y_[lane] = slope.y;
+    const float rho = relief * (slope.xy - slope.x * slope.y) / (alpha_x_[lane] * alpha_y_[lane]);
+    slope_correlation_[lane] = std::clamp(rho, -0.99f, 0.99f);
   }
 
   void add_radiance(std::uint32_t slot, Color color) { radiance_[slot] = radiance_[slot] + color; }
@@ -268,6 +308,11 @@ class Renderer {
     batch.alpha_x = {alpha_x_, lanes};
     batch.alpha_y = {alpha_y_, lanes};
     if (groups_[group].dielectric()) batch.eta = {eta_, lanes};
+    if (groups_[group].sloped) {
+      batch.mean_slope_x = {mean_slope_x_, lanes};
+      batch.mean_slope_y = {mean_slope_y_, lanes};
+      batch.slope_correlation = {slope_correlation_, lanes};
+    }
     return batch;
   }
   absl::Status call(Operation operation, const Batch& batch, Statistics* statistics = nullptr) {
@@ -465,10 +510,10 @@ class Renderer {
   Geometry& geometry_;
   Picture& picture_;
   const Light light_;
+  const Camera camera_;
   std::vector<Group> groups_;
   std::vector<std::uint8_t> group_of_;  // of each material
   float step_ = 0;
-  Vector right_, up_, forward_;
 
   std::uint32_t first_sample_ = 0, first_pixel_ = 0, pixels_ = 0;
   std::size_t capacity_ = 0;
@@ -477,7 +522,8 @@ class Renderer {
   Vectors incident_{}, outgoing_{}, towards_light_{}, shadow_origin_{}, shadow_direction_{}, from_light_{};
   float *u_ = nullptr, *v_ = nullptr, *distance_ = nullptr, *alpha_x_ = nullptr, *alpha_y_ = nullptr, *eta_ = nullptr,
         *u1_ = nullptr, *u2_ = nullptr, *u3_ = nullptr, *pdf_ = nullptr, *weight_ = nullptr, *value_ = nullptr,
-        *im_ = nullptr, *light_pdf_ = nullptr, *albedo_ = nullptr;
+        *im_ = nullptr, *light_pdf_ = nullptr, *albedo_ = nullptr, *mean_slope_x_ = nullptr, *mean_slope_y_ = nullptr,
+        *slope_correlation_ = nullptr;
   std::vector<std::uint32_t> triangle_, index_, listed_;
   std::vector<std::size_t> group_end_;
   std::vector<std::uint8_t> group_, status_, event_, visible_;
@@ -512,6 +558,35 @@ std::optional<Numbers> parse_numbers(std::string_view text) {
   for (const Numbers numbers : {Numbers::random, Numbers::sobol})
     if (text == name(numbers)) return numbers;
   return std::nullopt;
+}
+
+absl::StatusOr<FirstHits> first_hits(const Scene& scene, int width, int height) {
+  Settings settings;
+  settings.width = width, settings.height = height;
+  if (auto status = check(scene, settings); !status.ok()) return status;
+  auto geometry = Geometry::create(scene.mesh);
+  if (!geometry.ok()) return geometry.status();
+  const Camera camera(scene.view, width, height);
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  ColumnMemory memory(9, pixels);
+  std::vector<std::uint32_t> triangle(pixels);
+  const RayColumns rays{memory[0], memory[1], memory[2], memory[3], memory[4], memory[5]};
+  const auto direction = [&](std::size_t k) {
+    return camera.direction(static_cast<float>(k % static_cast<std::size_t>(width)) + 0.5f,
+                            static_cast<float>(k / static_cast<std::size_t>(width)) + 0.5f);
+  };
+  for (std::size_t k = 0; k < pixels; ++k)
+    for (std::size_t c = 0; c < 3; ++c) memory[c][k] = scene.view.eye[c], memory[3 + c][k] = direction(k)[c];
+  (*geometry)->intersect(rays, {triangle.data(), memory[6], memory[7], memory[8]}, 0, pixels, 0, true);
+  FirstHits hits{std::vector<float>(pixels), std::vector<float>(pixels), std::vector<float>(pixels)};
+  for (std::size_t k = 0; k < pixels; ++k) {
+    if (triangle[k] == kMissed) continue;
+    const Material& material = scene.materials[scene.mesh.parts[triangle[k]]];
+    const Surface surface = surface_at(scene.mesh, material, triangle[k], memory[6][k], memory[7][k], direction(k));
+    const Vector i = normalized(surface.frame.to_local(-1.0f * direction(k)));
+    hits.x[k] = i[0], hits.y[k] = i[1], hits.z[k] = i[2];
+  }
+  return hits;
 }
 
 absl::StatusOr<Picture> render(const Scene& scene, const Settings& settings, Engine& engine,

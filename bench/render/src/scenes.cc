@@ -12,6 +12,7 @@ namespace facetwise::render {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
+constexpr const char* kNormalMap = "/usr/share/assimp/models/glTF2/ClearCoat-glTF/PlasticWrap_normals.jpg";
 constexpr const char* kProbes = "/usr/share/blender/datafiles/studiolights/world/";
 
 // A point of a profile that is turned about the y axis: distance from it, height, and the normal there.
@@ -143,7 +144,51 @@ scene::Mesh plate(float width, float height, std::uint32_t part) {
   return mesh;
 }
 
-std::vector<std::string> built_in_scenes() { return {"orbs", "orb", "furnace", "glass"}; }
+scene::Mesh box(float width, float height, float depth, std::uint32_t part) {
+  scene::Mesh mesh;
+  const auto side = [&](float across, float up, float away, Vector x, Vector y) {
+    scene::Mesh one = plate(across, up, part);
+    const Vector z = cross(x, y);
+    for (Vector& p : one.positions) p = p[0] * x + p[1] * y + (0.5f * away) * z;
+    for (Vector& n : one.normals) n = z;
+    for (Vector& t : one.tangents) t = x;
+    append(mesh, one);
+  };
+  side(width, height, depth, {1, 0, 0}, {0, 1, 0});
+  side(width, height, depth, {-1, 0, 0}, {0, 1, 0});
+  side(depth, height, width, {0, 0, -1}, {0, 1, 0});
+  side(depth, height, width, {0, 0, 1}, {0, 1, 0});
+  side(width, depth, height, {1, 0, 0}, {0, 0, -1});
+  side(width, depth, height, {1, 0, 0}, {0, 0, 1});
+  return mesh;
+}
+
+scene::Mesh relief(int side, const std::vector<float>& heights, const SlopeMap& slopes, std::uint32_t part) {
+  scene::Mesh mesh;
+  const auto n = static_cast<std::uint32_t>(side);
+  // One more row and column: the square repeats.
+  for (std::uint32_t y = 0; y <= n; ++y)
+    for (std::uint32_t x = 0; x <= n; ++x) {
+      const std::uint32_t at = (y % n) * n + x % n;
+      const SlopeMap::Moments& slope = slopes.texel(static_cast<int>(x % n), static_cast<int>(y % n));
+      const float u = static_cast<float>(x) / static_cast<float>(side),
+                  v = static_cast<float>(y) / static_cast<float>(side);
+      mesh.positions.push_back({u - 0.5f, v - 0.5f, heights[at]});
+      mesh.normals.push_back(normalized({-slope.x, -slope.y, 1}));
+      mesh.tangents.push_back({1, 0, slope.x});
+      mesh.texcoords.push_back({u, 1 - v});
+    }
+  for (std::uint32_t y = 0; y < n; ++y)
+    for (std::uint32_t x = 0; x < n; ++x) {
+      const std::uint32_t at = y * (n + 1) + x;
+      mesh.triangles.push_back({at, at + 1, at + n + 2});
+      mesh.triangles.push_back({at, at + n + 2, at + n + 1});
+    }
+  mesh.parts.assign(mesh.triangles.size(), part);
+  return mesh;
+}
+
+std::vector<std::string> built_in_scenes() { return {"orbs", "orb", "furnace", "glass", "normal-map"}; }
 
 absl::StatusOr<Scene> built_in_scene(std::string_view name) {
   Scene scene;
@@ -158,16 +203,32 @@ absl::StatusOr<Scene> built_in_scene(std::string_view name) {
     const float turned = 42.5f * kPi / 180;
     scene.view = {{-std::sin(turned), 0, std::cos(turned)}, {0, 0, 0}, {0, 1, 0}, 2 * std::tan(turned)};
   } else if (name == "glass") {
-    // A rough plate of glass, thin for its size, before the probe.
-    scene.mesh = plate(2, 2, 0);
-    scene::Mesh back = plate(2, 2, 0);
-    for (Vector& p : back.positions) p = {-p[0], p[1], -0.1f};
-    for (Vector& n : back.normals) n = {0, 0, -1};
-    append(scene.mesh, back);
+    // A plate of glass, rough on all faces, seen from the side: the environment behind it and in it.
+    scene.mesh = box(2, 2, 0.2f, 0);
     scene.materials = {conductor(0.1f)};
     scene.materials[0].model.interface = Interface::dielectric;
     scene.materials[0].sampler = Sampler::visible;
-    scene.view = {{0, 0, 4}, {0, 0, 0}, {0, 1, 0}, 0.6f};
+    scene.view = {{2.2f, 1.2f, 3.2f}, {0, 0, 0}, {0, 1, 0}, 0.6f};
+  } else if (name == "normal-map") {
+    // A ball on a floor, both under a real normal map, strong enough that many normals face away from the viewer.
+    auto map = load_image(kNormalMap);
+    if (!map.ok())
+      return absl::NotFoundError(absl::StrCat(std::string(map.status().message()), " (Debian's assimp-testmodels)"));
+    scene.mesh = ball({0, 1, 0}, 1, 0);
+    for (auto& at : scene.mesh.texcoords) at = {6 * at[0], 3 * at[1]};
+    scene::Mesh floor = plate(16, 16, 1);
+    for (Vector& p : floor.positions) p = {p[0], 0, -p[1]};
+    for (Vector& n : floor.normals) n = {0, 1, 0};
+    for (auto& at : floor.texcoords) at = {8 * at[0], 8 * at[1]};
+    append(scene.mesh, floor);
+    scene.materials = {conductor(0.4f, Sampler::visible), conductor(0.4f, Sampler::visible)};
+    for (Material& material : scene.materials) {
+      material.normal_map = std::make_shared<Image>(*map);
+      material.normal_scale = 3;
+      material.f0 = {0.95f, 0.93f, 0.88f};
+    }
+    scene.view = {{0, 1.1f, 5.5f}, {0, 0.75f, 0}, {0, 1, 0}, 0.5f};
+    scene.aspect = 2;
   } else {
     return absl::NotFoundError(absl::StrCat("scene \"", std::string(name), "\": none of that name; there are ",
                                             absl::StrJoin(built_in_scenes(), ", ")));

@@ -9,9 +9,10 @@ namespace facetwise::render {
 
 struct Surface {
   Vector point;
-  Vector facing;         // geometric normal, unit, on the ray's side
-  scene::Frame frame;    // of the shading normal, on the same side
-  bool entering = true;  // the ray comes from outside
+  Vector facing;                    // geometric normal, unit, on the ray's side
+  scene::Frame frame;               // of the shading normal, on the same side
+  bool entering = true;             // the ray comes from outside
+  std::array<float, 2> texcoord{};  // (0, 0) where the mesh has none
 
   // A ray's beginning towards `direction`, moved off the triangle.
   Vector origin(Vector direction, float step) const {
@@ -33,21 +34,18 @@ inline Surface surface_at(const scene::Mesh& mesh, const Material& material, std
   normal = normalized(normal);
   if (dot(normal, facing) < 0) normal = -1.0f * normal;
   scene::Frame frame = mesh.tangents.empty() ? scene::Frame(normal) : scene::Frame(normal, at(mesh.tangents));
+  std::array<float, 2> texcoord{};
+  if (!mesh.texcoords.empty())
+    for (std::size_t k = 0; k < 2; ++k)
+      texcoord[k] = w * mesh.texcoords[a][k] + u * mesh.texcoords[b][k] + v * mesh.texcoords[c][k];
   if (material.normal_map && !mesh.texcoords.empty()) {
-    float s = 0, t = 0;
-    const float weights[] = {w, u, v};
-    const std::uint32_t vertices[] = {a, b, c};
-    for (int k = 0; k < 3; ++k) {
-      s += weights[k] * mesh.texcoords[vertices[k]][0];
-      t += weights[k] * mesh.texcoords[vertices[k]][1];
-    }
-    const Color texel = material.normal_map->sample(s, t);
+    const Color texel = material.normal_map->sample(texcoord[0], texcoord[1]);
     // Green is up, as glTF has it; texture coordinates grow along the tangent.
     const Vector bent = {material.normal_scale * (2 * texel[0] - 1), material.normal_scale * (2 * texel[1] - 1),
                          2 * texel[2] - 1};
     if (dot(bent, bent) > 1e-12f) frame = scene::Frame(normalized(frame.to_world(normalized(bent))), frame.tangent);
   }
-  return {at(mesh.positions), facing, frame, entering};
+  return {at(mesh.positions), facing, frame, entering, texcoord};
 }
 
 }  // namespace facetwise::render

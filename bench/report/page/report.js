@@ -103,6 +103,7 @@ function plot(parent, figure) {
   const element = add(parent, "figure");
   add(element, "h3", {}, figure.title);
   const all = figure.series.flatMap((series) => series.points);
+  const names = [...new Set(figure.series.map((series) => series.name))];  // curves of one name look alike
   const usable = (value, log) => !log || value > 0;
   const extent = (k, log) => {
     const [low, high] = d3.extent(all.map((point) => point[k]).filter((value) => usable(value, log)));
@@ -129,7 +130,8 @@ function plot(parent, figure) {
       x.domain(ex), y.domain(ey).nice();
     }
     axes(svg, x, y, { width, height, margin, x_label: figure.x, y_label: figure.y, x_ticks: width < 480 ? 5 : 9, y_ticks: 6 });
-    figure.series.forEach((series, k) => {
+    figure.series.forEach((series) => {
+      const k = names.indexOf(series.name);
       const points = series.points.filter((point) => usable(point[0], figure.log_x) && usable(point[1], figure.log_y));
       // A jump in a drawing is a gap.
       const far = (a, b) => figure.equal_scales && points.length > 20 && Math.hypot(a[0] - b[0], a[1] - b[1]) > 0.1;
@@ -142,13 +144,13 @@ function plot(parent, figure) {
       for (const piece of pieces)
         svg.append("path").attr("class", "curve").attr("d", line(piece)).attr("fill", "none").attr("stroke", color(k))
           .attr("stroke-width", 2).attr("stroke-dasharray", dashes[k % 6]);
-      if (points.length <= 40)
+      if (points.length <= 40 && names.length === figure.series.length)
         svg.selectAll(null).data(points).enter().append("path").attr("d", d3.symbol().type(symbols[k % 6]).size(36))
           .attr("transform", (point) => `translate(${x(point[0])},${y(point[1])})`).attr("fill", color(k))
           .append("title").text((point) => `${series.name}: ${number(point[0])}, ${number(point[1])}`);
     });
   });
-  key(element, figure.series.map((series) => series.name), (svg, k) => {
+  key(element, names, (svg, k) => {
     svg.append("line").attr("x1", 0).attr("x2", 26).attr("y1", 6).attr("y2", 6).attr("stroke", color(k)).attr("stroke-width", 2)
       .attr("stroke-dasharray", dashes[k % 6]);
     svg.append("path").attr("d", d3.symbol().type(symbols[k % 6]).size(36)).attr("transform", "translate(13,6)").attr("fill", color(k));

@@ -46,6 +46,29 @@ struct Image {
 // EXR as linear RGB; PNG, JPEG and the like as they are stored, in [0, 1]. Errors begin with the path.
 absl::StatusOr<Image> load_image(const std::string& path);
 
+// Moments of the slopes of a displacement map over squares of 1, 2, 4 ... texels: what a surface seen from afar has
+// instead of its relief (LEADR: Dupuy et al. 2013).
+class SlopeMap {
+ public:
+  struct Moments {
+    float x = 0, y = 0;            // means
+    float xx = 0, yy = 0, xy = 0;  // means of squares and of the product
+  };
+  // Heights of a square that repeats, `side` (a power of two) texels each way, `spacing` apart; x grows along rows, y from
+  // row to row.
+  SlopeMap(int side, const std::vector<float>& heights, float spacing);
+
+  int side() const { return side_; }
+  // At (x, y) in texels, over squares of 2^level texels, interpolated between texels and levels.
+  Moments at(float x, float y, float level) const;
+  const Moments& texel(int x, int y) const { return levels_[0][static_cast<std::size_t>(y * side_ + x)]; }
+
+ private:
+  Moments at_level(float x, float y, std::size_t level) const;
+  int side_;
+  std::vector<std::vector<Moments>> levels_;
+};
+
 struct Material {
   Model model{};  // its interface is conductor or dielectric: a conductor's Fresnel factor is the renderer's, in colour
   Sampler sampler = Sampler::exact;
@@ -56,6 +79,10 @@ struct Material {
   bool compensated = false;
   std::shared_ptr<const Image> normal_map;  // tangent space, 0.5 is 0
   float normal_scale = 1;                   // of its x and y
+  // Mean slopes and roughness per lane, from moments over each path's footprint, with alpha as the roughness of the relief
+  // itself: Beckmann with Smith masking. One copy over the texture coordinates' unit square, y against v.
+  std::shared_ptr<const SlopeMap> slopes;
+  bool mean_slopes_only = false;  // leaves the relief's variance out, as plain filtered normal maps do
 };
 
 // Light from everywhere: a light probe (latitude-longitude, +y up) or a constant.
@@ -143,6 +170,13 @@ struct Picture {
 absl::StatusOr<Picture> render(const Scene& scene, const Settings& settings, Engine& engine,
                                std::optional<Picture> resumed = std::nullopt);
 
+// What the camera sees first: the incident direction at the middle of each pixel, in the shading normal's frame. All zero
+// where there is nothing.
+struct FirstHits {
+  std::vector<float> x, y, z;
+};
+absl::StatusOr<FirstHits> first_hits(const Scene& scene, int width, int height);
+
 // An engine whose calls are the benchmarks' scalar baseline, path by path: what a renderer gains by the library.
 // GGX, Beckmann and Student-t conductors.
 std::unique_ptr<Engine> scalar_engine();
@@ -173,9 +207,13 @@ scene::Mesh orb(Vector center, float radius, std::uint32_t part);
 scene::Mesh ball(Vector center, float radius, std::uint32_t part);
 // A rectangle in the plane z = 0 with its normal to +z.
 scene::Mesh plate(float width, float height, std::uint32_t part);
+// A box about the origin, of six plates.
+scene::Mesh box(float width, float height, float depth, std::uint32_t part);
+// The relief of a displacement map over the unit square about the origin, with smooth normals.
+scene::Mesh relief(int side, const std::vector<float>& heights, const SlopeMap& slopes, std::uint32_t part);
 void append(scene::Mesh& to, const scene::Mesh& mesh);
 
-// Scenes made by code, by name: "orbs", "orb", "furnace", "glass", "normal-map".
+// Scenes made by code, by name.
 absl::StatusOr<Scene> built_in_scene(std::string_view name);
 std::vector<std::string> built_in_scenes();
 
