@@ -4,13 +4,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <string>
 #include <utility>
 
 namespace facetwise::app {
 
-// On a terminal one line that changes, else a line for each tenth.
+// On a terminal one line that changes, with the time left, else a line for each tenth.
 class Progress {
  public:
   explicit Progress(std::string what) : what_(std::move(what)) {}
@@ -24,13 +26,20 @@ class Progress {
     const int percent = static_cast<int>(100 * done);
     if (percent == shown_ || (!terminal_ && percent / 10 == shown_ / 10 && shown_ >= 0)) return;
     shown_ = percent;
-    fmt::print(stderr, "{}{}: {} %{}", terminal_ ? "\r" : "", what_, percent, terminal_ ? "" : "\n");
+    if (terminal_) {
+      const double taken = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+      const auto left = static_cast<int>(taken * (1 - done) / std::max(done, 1e-9) + 0.5);
+      fmt::print(stderr, "\r{}: {:3} %, {}:{:02} left ", what_, percent, left / 60, left % 60);
+    } else {
+      fmt::print(stderr, "{}: {} %\n", what_, percent);
+    }
     std::fflush(stderr);
   }
 
  private:
   const std::string what_;
   const bool terminal_ = isatty(STDERR_FILENO) != 0;
+  const std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   int shown_ = -1;
 };
 

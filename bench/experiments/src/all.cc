@@ -10,7 +10,8 @@ std::vector<Experiment> all_experiments() {
           {"backfacing", "Shading normals that face away", backfacing_page},
           {"convergence", "Visible normals: convergence, and rough glass", convergence_page},
           {"retro", "Reflecting back: the back vector", retro_page},
-          {"relief", "A displaced surface from afar", relief_page}};
+          {"relief", "A displaced surface from afar", relief_page},
+          {"renderer", "What a renderer gains", renderer_page}};
 }
 
 }  // namespace facetwise::experiments

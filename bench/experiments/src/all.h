@@ -10,6 +10,7 @@ absl::StatusOr<Page> backfacing_page(const Options& options);
 absl::StatusOr<Page> bounded_page(const Options& options);
 absl::StatusOr<Page> convergence_page(const Options& options);
 absl::StatusOr<Page> relief_page(const Options& options);
+absl::StatusOr<Page> renderer_page(const Options& options);
 absl::StatusOr<Page> retro_page(const Options& options);
 absl::StatusOr<Page> wasted_page(const Options& options);
 

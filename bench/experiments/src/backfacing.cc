@@ -196,7 +196,7 @@ absl::StatusOr<Page> backfacing_page(const Options& options) {
   render::Settings settings;
   settings.width = by_size(options, 128, 384, 1024);
   settings.height = settings.width / 2;
-  settings.samples = by_size(options, 64u, 512u, 2048u);
+  settings.samples = by_size(options, 64u, 256u, 2048u);
   settings.numbers = render::Numbers::sobol;
   const auto hits = render::first_hits(*scene, settings.width, settings.height);
   if (!hits.ok()) return hits.status();
@@ -208,7 +208,7 @@ absl::StatusOr<Page> backfacing_page(const Options& options) {
               {}};
   double least_ratio = 10, farthest = 0, smallest = 1;
   for (const auto& [distribution, masking, letter] : kCompositions) {
-    if (auto status = steps.begin(fmt::format("{} with {}", name(distribution), name(masking)), 10); !status.ok())
+    if (auto status = steps.begin(fmt::format("{} with {}", name(distribution), name(masking)), 10, 4); !status.ok())
       return status;
     render::Picture found[2][2];  // [older][by visible normals]
     double mean[2][2] = {};

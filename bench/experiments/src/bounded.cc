@@ -100,7 +100,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
   constexpr std::uint32_t kSamples = 8;
   const std::uint32_t reference_samples = kSamples * by_size(options, 64u, 256u, 256u);
 
-  if (auto status = steps.begin("orbs: the reference", 45); !status.ok()) return status;
+  if (auto status = steps.begin("orbs: the reference", 45, 2); !status.ok()) return status;
   const auto truth = reference(scene, settings, reference_samples, steps);
   if (!truth.ok()) return truth.status();
 
@@ -112,7 +112,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
   std::map<Sampler, Rendered> main;  // random numbers, no light sampling: as the text
   for (const bool light_sampling : {false, true})
     for (const render::Numbers numbers : {render::Numbers::random, render::Numbers::sobol}) {
-      if (auto status = steps.begin("orbs: eight samples", 3); !status.ok()) return status;
+      if (auto status = steps.begin("orbs: eight samples", 3, 9); !status.ok()) return status;
       settings.light_sampling = light_sampling;
       settings.numbers = numbers;
       auto all = render_each(scene, equal(kSamples), settings, 3, steps);
@@ -160,7 +160,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
   page.figures.emplace_back(std::move(table));
 
   // Equal time.
-  if (auto status = steps.begin("orbs: equal time", 12); !status.ok()) return status;
+  if (auto status = steps.begin("orbs: equal time", 12, 30); !status.ok()) return status;
   const std::uint32_t base = by_size(options, 16u, 64u, 64u);
   Table times{"Equal time: as many samples as fit into the time that cap takes",
               {"numbers", "light", "sampler", "samples", "seconds", "RMSE", "of cap's"},
@@ -232,7 +232,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
                           "Error grows with roughness for cap, less for bounded, least for exact.");
   std::map<Sampler, double> found, rough;
   for (const double alpha : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0}) {
-    if (auto status = steps.begin(fmt::format("isotropic alpha {}", alpha), 1.2); !status.ok()) return status;
+    if (auto status = steps.begin(fmt::format("isotropic alpha {}", alpha), 1.2, 3); !status.ok()) return status;
     if (auto status = errors(static_cast<float>(alpha), static_cast<float>(alpha), found); !status.ok()) return status;
     for (std::size_t k = 0; k < 3; ++k) isotropic.series[k].points.emplace_back(alpha, found[kSamplers[k]]);
     if (alpha == 0.8) rough = found;
@@ -245,7 +245,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
                        "Error of the three samplers; bounded comes close to cap where the two roughnesses differ much, "
                        "exact does not.");
     for (const double alpha_x : {0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0}) {
-      if (auto status = steps.begin(fmt::format("anisotropic alpha {}, {}", alpha_x, alpha_y), 1.2); !status.ok())
+      if (auto status = steps.begin(fmt::format("anisotropic alpha {}, {}", alpha_x, alpha_y), 1.2, 3); !status.ok())
         return status;
       if (auto status = errors(static_cast<float>(alpha_x), static_cast<float>(alpha_y), found); !status.ok())
         return status;

@@ -130,7 +130,7 @@ absl::StatusOr<Page> convergence_page(const Options& options) {
   auto scene = lit("glass");
   if (!scene.ok()) return scene.status();
   render::Settings settings;
-  settings.width = by_size(options, 64, 192, 512);
+  settings.width = by_size(options, 64, 96, 512);
   settings.height = settings.width;
   settings.light_sampling = false;
   const std::uint32_t many = 64 * by_size(options, 16u, 256u, 256u);
@@ -141,7 +141,7 @@ absl::StatusOr<Page> convergence_page(const Options& options) {
   std::map<int, double> ratio, timed;
   for (const Glass& glass : kGlass) {
     if (quick && glass.figure != 5 && glass.figure != 9 && glass.figure != 12) continue;
-    if (auto status = steps.begin(fmt::format("glass, figure {}", glass.figure), 7.5); !status.ok()) return status;
+    if (auto status = steps.begin(fmt::format("glass, figure {}", glass.figure), 7.5, 3); !status.ok()) return status;
     auto& material = scene->materials[0];
     material.model.distribution = glass.distribution;
     material.alpha_x = glass.alpha_x;

@@ -7,18 +7,22 @@
 
 namespace facetwise::experiments {
 
-absl::Status Steps::begin(std::string_view what, double weight) {
-  done_ += std::exchange(weight_, weight);
-  what_ = std::string(what);
-  if (options_.progress && !options_.progress(what_, std::min(1.0, done_ / total_)))
-    return absl::CancelledError("stopped");
-  return absl::OkStatus();
+bool Steps::say(double done) {
+  said_ = std::clamp(done / total_, said_, 1.0);
+  return !options_.progress || options_.progress(what_, said_);
 }
 
-std::function<bool(double)> Steps::inside() {
-  return [this](double done) {
-    return !options_.progress || options_.progress(what_, std::min(1.0, (done_ + done * weight_) / total_));
-  };
+absl::Status Steps::begin(std::string_view what, double weight, int pictures) {
+  done_ += std::exchange(weight_, weight);
+  pictures_ = pictures;
+  picture_ = 0;
+  what_ = std::string(what);
+  return say(done_) ? absl::OkStatus() : absl::CancelledError("stopped");
+}
+
+std::function<bool(double)> Steps::picture() {
+  const double before = std::min(picture_++, pictures_ - 1);
+  return [this, before](double done) { return say(done_ + weight_ * (before + done) / pictures_); };
 }
 
 std::string percent(double share) { return fmt::format("{:.2f} %", 100 * share); }
@@ -39,7 +43,7 @@ absl::StatusOr<render::Scene> lit(std::string_view name) {
 
 absl::StatusOr<render::Picture> render_here(const render::Scene& scene, render::Settings settings, Steps& steps) {
   static const auto engine = local_engine();
-  settings.progress = steps.inside();
+  settings.progress = steps.picture();
   auto picture = render::render(scene, settings, *engine);
   if (picture.ok() && picture->samples() < settings.samples) return absl::CancelledError("stopped");
   return picture;

@@ -16,14 +16,18 @@ namespace facetwise::experiments {
 class Steps {
  public:
   Steps(const Options& options, double total) : options_(options), total_(total) {}
-  // Says what begins; `weight` of the total is done when the next step begins.
-  absl::Status begin(std::string_view what, double weight = 1);
-  // Progress inside the step, in the form that render() asks for.
-  std::function<bool(double)> inside();
+  // Says what begins; `weight` of the total is done when the next step begins. The step renders that many pictures,
+  // about equally long.
+  absl::Status begin(std::string_view what, double weight = 1, int pictures = 1);
+  // Progress of the step's next picture, in the form that render() asks for.
+  std::function<bool(double)> picture();
 
  private:
+  bool say(double done);
+
   const Options& options_;
-  double total_, done_ = 0, weight_ = 0;
+  double total_, done_ = 0, weight_ = 0, said_ = 0;
+  int pictures_ = 1, picture_ = 0;
   std::string what_;
 };
 

@@ -121,7 +121,7 @@ absl::StatusOr<Page> relief_page(const Options& options) {
   if (!hits.ok()) return hits.status();
   const auto inside = interior(*hits, settings.width, settings.height);
 
-  if (auto status = steps.begin("geometry", 10); !status.ok()) return status;
+  if (auto status = steps.begin("geometry", 10, 2); !status.ok()) return status;
   scene->mesh = lying(render::relief(side, heights, *slopes, 0));
   const std::size_t triangles = scene->mesh.triangles.size();
   const std::uint32_t many = by_size(options, 512u, 4096u, 16384u);
@@ -134,7 +134,7 @@ absl::StatusOr<Page> relief_page(const Options& options) {
   if (auto status = steps.begin("moments of slopes", 4); !status.ok()) return status;
   auto leadr = render_here(*scene, settings, steps);
   if (!leadr.ok()) return leadr.status();
-  if (auto status = steps.begin("mean slopes alone", 4); !status.ok()) return status;
+  if (auto status = steps.begin("mean slopes alone", 4, 2); !status.ok()) return status;
   material.mean_slopes_only = true;
   const auto mean_only = render_here(*scene, settings, steps);
   if (!mean_only.ok()) return mean_only.status();

@@ -143,7 +143,7 @@ absl::StatusOr<Page> retro_page(const Options& options) {
   render::Settings settings;
   settings.width = by_size(options, 128, 384, 1024);
   settings.height = static_cast<int>(static_cast<float>(settings.width) / scene->aspect);
-  settings.samples = by_size(options, 64u, 512u, 2048u);
+  settings.samples = by_size(options, 64u, 256u, 2048u);
   settings.numbers = render::Numbers::sobol;
   for (auto& material : scene->materials) {
     material.alpha_x = material.alpha_y = 0.2f;

@@ -138,9 +138,9 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
   if (!scene.ok()) return scene.status();
   std::map<Sampler, double> errors;
   for (const float alpha : {0.1f, 0.3f, 0.6f}) {
-    if (auto status = steps.begin(fmt::format("pictures at alpha {}", alpha), 6); !status.ok()) return status;
+    if (auto status = steps.begin(fmt::format("pictures at alpha {}", alpha), 6, 3); !status.ok()) return status;
     render::Settings settings;
-    settings.width = by_size(options, 96, 256, 512);
+    settings.width = by_size(options, 96, 160, 512);
     settings.height = static_cast<int>(static_cast<float>(settings.width) / scene->aspect);
     settings.light_sampling = false;
     scene->materials[0].alpha_x = scene->materials[0].alpha_y = alpha;

@@ -49,17 +49,17 @@ absl::StatusOr<Image> load_exr_image(const std::string& path) {
 }  // namespace
 
 Color Image::sample(float u, float v) const {
-  const auto wrap = [](int k, int n) { return ((k % n) + n) % n; };
   const float x = (u - std::floor(u)) * static_cast<float>(width) - 0.5f;
   const float y = (v - std::floor(v)) * static_cast<float>(height) - 0.5f;
   const float fx = std::floor(x), fy = std::floor(y);
-  const int x0 = wrap(static_cast<int>(fx), width), x1 = wrap(x0 + 1, width);
-  const int y0 = wrap(static_cast<int>(fy), height), y1 = wrap(y0 + 1, height);
+  // fx and fy are -1 at least, and at most the last.
+  const int x0 = fx < 0 ? width - 1 : std::min(static_cast<int>(fx), width - 1), x1 = x0 + 1 == width ? 0 : x0 + 1;
+  const int y0 = fy < 0 ? height - 1 : std::min(static_cast<int>(fy), height - 1), y1 = y0 + 1 == height ? 0 : y0 + 1;
   const float s = x - fx, t = y - fy;
+  const float *a = at(x0, y0), *b = at(x1, y0), *c = at(x0, y1), *d = at(x1, y1);
   Color result;
-  for (int k = 0; k < 3; ++k)
-    result[static_cast<std::size_t>(k)] =
-        (1 - t) * ((1 - s) * at(x0, y0)[k] + s * at(x1, y0)[k]) + t * ((1 - s) * at(x0, y1)[k] + s * at(x1, y1)[k]);
+  for (std::size_t k = 0; k < 3; ++k)
+    result[k] = (1 - t) * ((1 - s) * a[k] + s * b[k]) + t * ((1 - s) * c[k] + s * d[k]);
   return result;
 }
 

@@ -203,11 +203,13 @@ function bars(parent, { title, alt, label, names, groups, marks = {} }) {
 
 function pictures(parent, figure) {
   const element = add(parent, "figure", { class: "pictures" });
+  const zoom = Math.max(1, Math.floor(400 / figure.width));  // small pictures are shown larger, pixel by pixel
+  const size = { width: zoom * figure.width, height: zoom * figure.height };
   add(element, "h3", {}, figure.title);
   const source = (one) => "data:image/png;base64," + one.png;
   const box = add(element, "div", { class: "compare" });
-  const below = add(box, "img", { width: figure.width, height: figure.height });
-  const above = add(box, "img", { class: "above", width: figure.width, height: figure.height });
+  const below = add(box, "img", size);
+  const above = add(box, "img", { class: "above", ...size });
   const rule = add(box, "div", { class: "rule" });
   const controls = add(element, "div", { class: "controls" });
   const choose = (label, chosen) => {
@@ -244,7 +246,7 @@ function pictures(parent, figure) {
   const grid = add(details, "div", { class: "all-pictures" });
   for (const one of figure.pictures) {
     const cell = add(grid, "figure");
-    add(cell, "img", { src: source(one), alt: `${one.name}. ${figure.alt}`, width: figure.width, height: figure.height, loading: "lazy" });
+    add(cell, "img", { src: source(one), alt: `${one.name}. ${figure.alt}`, ...size, loading: "lazy" });
     add(cell, "figcaption", {}, `${one.name}: ${one.caption}`);
   }
 }
