@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <fstream>
+#include <iterator>
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/render.h"
@@ -63,17 +65,29 @@ Color Image::sample(float u, float v) const {
   return result;
 }
 
-absl::StatusOr<Image> load_image(const std::string& path) {
-  if (path.ends_with(".exr")) return load_exr_image(path);
+absl::StatusOr<Image> decode_image(std::string_view bytes, const std::string& name) {
   Image image;
   int channels = 0;
-  stbi_uc* bytes = stbi_load(path.c_str(), &image.width, &image.height, &channels, 3);
-  if (bytes == nullptr) return absl::InvalidArgumentError(absl::StrCat(path, ": ", stbi_failure_reason()));
+  stbi_uc* values = stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(bytes.data()),
+                                          static_cast<int>(bytes.size()), &image.width, &image.height, &channels, 3);
+  if (values == nullptr) return absl::InvalidArgumentError(absl::StrCat(name, ": ", stbi_failure_reason()));
   image.values.resize(3 * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
-  std::transform(bytes, bytes + image.values.size(), image.values.begin(),
+  std::transform(values, values + image.values.size(), image.values.begin(),
                  [](stbi_uc value) { return static_cast<float>(value) / 255.0f; });
-  stbi_image_free(bytes);
+  stbi_image_free(values);
   return image;
+}
+
+absl::StatusOr<Image> load_image(const std::string& path) {
+  if (path.ends_with(".exr")) return load_exr_image(path);
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return absl::NotFoundError(absl::StrCat(path, ": cannot be read"));
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  return decode_image(bytes, path);
+}
+
+void make_linear(Image& image) {
+  for (float& v : image.values) v = v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
 }
 
 }  // namespace facetwise::render

@@ -16,24 +16,43 @@
 namespace facetwise::render {
 namespace {
 
-absl::StatusOr<std::shared_ptr<const Image>> texture(const std::string& scene_path, const aiMaterial& material,
-                                                     aiTextureType type,
-                                                     std::map<std::string, std::shared_ptr<const Image>>& known) {
-  aiString name;
-  if (material.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return nullptr;
-  if (name.C_Str()[0] == '*')
-    return absl::UnimplementedError(
-        absl::StrCat(scene_path, ": textures inside the file are not read; keep them beside it"));
-  const std::string path = (std::filesystem::path(scene_path).parent_path() / name.C_Str()).string();
-  auto& image = known[path];
-  if (!image) {
-    auto loaded = load_image(path);
+// Reads each texture of a file once, from beside it or from within.
+class Textures {
+ public:
+  Textures(const std::string& path, const aiScene& file) : path_(path), file_(file) {}
+
+  absl::StatusOr<std::shared_ptr<const Image>> get(const aiMaterial& material, aiTextureType type, bool srgb = false) {
+    aiString name;
+    if (material.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return nullptr;
+    auto& image = known_[{name.C_Str(), srgb}];
+    if (image) return image;
+    auto loaded = read(name.C_Str());
     if (!loaded.ok())
-      return absl::InvalidArgumentError(absl::StrCat(scene_path, ": ", std::string(loaded.status().message())));
-    image = std::make_shared<Image>(*std::move(loaded));
+      return absl::InvalidArgumentError(absl::StrCat(path_, ": ", std::string(loaded.status().message())));
+    if (srgb) make_linear(*loaded);
+    return image = std::make_shared<Image>(*std::move(loaded));
   }
-  return image;
-}
+
+ private:
+  absl::StatusOr<Image> read(const char* name) const {
+    const aiTexture* within = file_.GetEmbeddedTexture(name);
+    if (within == nullptr) return load_image((std::filesystem::path(path_).parent_path() / name).string());
+    // Height 0: the bytes of a file of mWidth bytes.
+    if (within->mHeight == 0)
+      return decode_image({reinterpret_cast<const char*>(within->pcData), within->mWidth}, name);
+    Image image;
+    image.width = static_cast<int>(within->mWidth);
+    image.height = static_cast<int>(within->mHeight);
+    for (unsigned k = 0; k < within->mWidth * within->mHeight; ++k)
+      for (const unsigned char value : {within->pcData[k].r, within->pcData[k].g, within->pcData[k].b})
+        image.values.push_back(static_cast<float>(value) / 255.0f);
+    return image;
+  }
+
+  const std::string& path_;
+  const aiScene& file_;
+  std::map<std::pair<std::string, bool>, std::shared_ptr<const Image>> known_;
+};
 
 }  // namespace
 
@@ -47,21 +66,30 @@ absl::StatusOr<Scene> load_scene(const std::string& path) {
   Scene scene;
   scene.name = path;
   scene.mesh = *std::move(mesh);
-  std::map<std::string, std::shared_ptr<const Image>> images;
+  Textures textures(path, *file);
   for (unsigned k = 0; k < file->mNumMeshes; ++k) {
     const aiMaterial& source = *file->mMaterials[file->mMeshes[k]->mMaterialIndex];
     Material material;
-    float roughness = 0.5f, metallic = 0;
-    source.Get(AI_MATKEY_ROUGHNESS_FACTOR, roughness);
-    source.Get(AI_MATKEY_METALLIC_FACTOR, metallic);
+    auto& metallic = material.metallic.emplace();
+    // A file without metallic roughness is matte and dull.
+    metallic.metalness = 0;
+    metallic.roughness = 0.7f;
+    source.Get(AI_MATKEY_ROUGHNESS_FACTOR, metallic.roughness);
+    source.Get(AI_MATKEY_METALLIC_FACTOR, metallic.metalness);
     aiColor4D base(0.8f, 0.8f, 0.8f, 1);
     if (source.Get(AI_MATKEY_BASE_COLOR, base) != AI_SUCCESS) source.Get(AI_MATKEY_COLOR_DIFFUSE, base);
-    material.alpha_x = material.alpha_y = std::clamp(alpha_from_perceptual(roughness), 0.0f, 1.0f);
-    // glTF 2.0, appendix B: a metal's colour is its reflectance.
-    for (unsigned c = 0; c < 3; ++c) material.f0[c] = std::clamp(0.04f + metallic * (base[c] - 0.04f), 0.0f, 1.0f);
-    auto normals = texture(path, source, aiTextureType_NORMALS, images);
-    if (!normals.ok()) return normals.status();
-    material.normal_map = *normals;
+    for (unsigned c = 0; c < 3; ++c) metallic.color[c] = std::clamp(base[c], 0.0f, 1.0f);
+    const auto read = [&](std::shared_ptr<const Image>& map, aiTextureType type, bool srgb = false) {
+      auto image = textures.get(source, type, srgb);
+      if (image.ok() && *image) map = *image;
+      return image.status();
+    };
+    // assimp has glTF's base colour under both names, and its metallic roughness under UNKNOWN.
+    for (const auto& status :
+         {read(metallic.color_map, aiTextureType_DIFFUSE, true),
+          read(metallic.color_map, aiTextureType_BASE_COLOR, true), read(metallic.roughness_map, aiTextureType_UNKNOWN),
+          read(material.normal_map, aiTextureType_NORMALS)})
+      if (!status.ok()) return status;
     source.Get(AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), material.normal_scale);
     scene.materials.push_back(std::move(material));
   }

@@ -24,6 +24,8 @@ namespace {
 constexpr std::size_t kWave = std::size_t{1} << 16;  // paths at once
 constexpr int kRouletteFrom = 8;
 constexpr std::uint8_t kLeftOut = 0xff;
+constexpr float kInversePi = 0.318309886f;
+constexpr float kShareOfBase = 0.5f;  // of the samples of surfaces that have a base
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
@@ -35,10 +37,10 @@ void for_lanes(std::size_t lanes, const Body& body) {
 }
 
 // Decisions of a path that need numbers. The engine's generator has dimensions of its own.
-enum class Decision : std::uint32_t { light = 0, scattering = 1, roulette = 2 };
+enum class Decision : std::uint32_t { light = 0, scattering = 1, roulette = 2, base = 3 };
 constexpr std::uint32_t kPlaceInPixel = 0;
 constexpr std::uint32_t dimension(int bounce, Decision decision) {
-  return 1 + 3 * static_cast<std::uint32_t>(bounce) + static_cast<std::uint32_t>(decision);
+  return 1 + 4 * static_cast<std::uint32_t>(bounce) + static_cast<std::uint32_t>(decision);
 }
 
 // Surfaces that one call of the engine can answer: those of one model and sampler.
@@ -47,6 +49,7 @@ struct Group {
   Sampler sampler;
   bool compensated;
   bool sloped;  // has mean slopes
+  bool base;    // has a matte base
   bool dielectric() const { return model.interface == Interface::dielectric; }
 };
 
@@ -64,6 +67,11 @@ struct Paths {
   float* pdf;  // of the direction; 0 where it was not drawn from a density
   std::vector<std::uint32_t> slot;
 };
+
+bool has_base(const Material& material) {
+  return material.model.interface != Interface::dielectric &&
+         (material.metallic ? material.metallic->metalness < 1 : material.base != Color{});
+}
 
 float schlick(float f0, float im) {
   const float c = 1 - std::min(im, 1.0f), c2 = c * c;
@@ -104,7 +112,7 @@ class Renderer {
     for (const Material& material : scene.materials) {
       const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const Group& group) {
         return group.sampler == material.sampler && group.compensated == material.compensated &&
-               group.sloped == (material.slopes != nullptr) &&
+               group.sloped == (material.slopes != nullptr) && group.base == has_base(material) &&
                group.model.distribution == material.model.distribution &&
                group.model.masking == material.model.masking && group.model.shadowing == material.model.shadowing &&
                group.model.normalisation == material.model.normalisation &&
@@ -113,7 +121,8 @@ class Renderer {
       });
       group_of_.push_back(static_cast<std::uint8_t>(same - groups_.begin()));
       if (same == groups_.end())
-        groups_.push_back({material.model, material.sampler, material.compensated, material.slopes != nullptr});
+        groups_.push_back(
+            {material.model, material.sampler, material.compensated, material.slopes != nullptr, has_base(material)});
     }
     Vector low = scene.mesh.positions[0], high = low;
     for (const Vector& p : scene.mesh.positions)
@@ -122,7 +131,21 @@ class Renderer {
     step_ = 1e-5f * std::sqrt(dot(size, size));
   }
 
-  std::size_t groups() const { return groups_.size(); }
+  // Has the engine build the tables of albedo that it will need, which takes seconds the first time.
+  absl::Status prepare() {
+    for (const Group& group : groups_) {
+      if (!group.compensated && !group.base) continue;
+      float albedo = 0;
+      Batch one;
+      one.model = group.model;
+      one.lanes = 1;
+      one.incident = {0.0f, 0.0f, 1.0f};
+      one.alpha_x = one.alpha_y = 0.5f;
+      one.out.albedo = {&albedo, 1};
+      if (const auto result = engine_.run(Operation::albedo, one); !result.ok()) return result.status();
+    }
+    return absl::OkStatus();
+  }
 
   // Samples [first, last) of pixels [begin, end).
   absl::Status wave(std::uint32_t first, std::uint32_t last, std::uint32_t begin, std::uint32_t end) {
@@ -182,6 +205,7 @@ class Renderer {
     group_.resize(lanes), status_.resize(lanes), event_.resize(lanes), visible_.resize(lanes);
     id_.resize(lanes), index_.resize(lanes);
     surface_.resize(lanes, Surface{{}, {}, scene::Frame({0, 0, 1}), true, {}});
+    f0_.resize(lanes), base_.resize(lanes), from_base_.resize(lanes);
     radiance_.resize(lanes), surfaces_.resize(lanes), rejected_.resize(lanes);
   }
 
@@ -239,6 +263,9 @@ class Renderer {
         incident_.set(lane, normalized(i));
         alpha_x_[lane] = here.alpha_x;
         alpha_y_[lane] = here.alpha_y;
+        f0_[lane] = here.f0;
+        base_[lane] = here.base;
+        if (here.metallic) set_metallic(lane, *here.metallic);
         if (here.slopes) set_slopes(lane, here, distance_[lane]);
         eta_[lane] = surface.entering ? here.eta : 1 / here.eta;
         id_[lane] = std::uint64_t{sample(slot)} * picture_.pixels.size() + pixel(slot);
@@ -249,6 +276,21 @@ class Renderer {
         group_[lane] = group_of_[scene_.mesh.parts[triangle_[lane]]];
       }
     });
+  }
+
+  void set_metallic(std::size_t lane, const Material::Metallic& here) {
+    const auto& at = surface_[lane].texcoord;
+    const Color color = here.color_map ? here.color * here.color_map->sample(at[0], at[1]) : here.color;
+    float roughness = here.roughness, metalness = here.metalness;
+    if (here.roughness_map) {
+      const Color map = here.roughness_map->sample(at[0], at[1]);
+      roughness *= map[1], metalness *= map[2];
+    }
+    alpha_x_[lane] = alpha_y_[lane] = alpha_from_perceptual(std::clamp(roughness, 0.0f, 1.0f));
+    for (std::size_t k = 0; k < 3; ++k) {
+      f0_[lane][k] = 0.04f + metalness * (color[k] - 0.04f);
+      base_[lane][k] = (1 - metalness) * color[k];
+    }
   }
 
   // Mean slopes and roughness over the path's footprint, as from the eye: that of a pixel, along its shorter side (its
@@ -323,9 +365,9 @@ class Renderer {
     return result.status();
   }
 
-  // E of the lanes that are compensated.
+  // E of the lanes that are compensated or have a base.
   absl::Status find_albedo(std::size_t lanes, std::size_t group) {
-    if (!groups_[group].compensated) return absl::OkStatus();
+    if (!groups_[group].compensated && !groups_[group].base) return absl::OkStatus();
     Batch albedo = batch(lanes, group);
     albedo.out.albedo = {albedo_, lanes};
     return call(Operation::albedo, albedo);
@@ -337,10 +379,28 @@ class Renderer {
     if (here.model.interface == Interface::dielectric) return {1, 1, 1};
     Color result;
     for (std::size_t k = 0; k < 3; ++k) {
-      result[k] = schlick(here.f0[k], im);
-      if (here.compensated) result[k] *= 1 + here.f0[k] * (1 - albedo_[lane]) / albedo_[lane];
+      result[k] = schlick(f0_[lane][k], im);
+      if (here.compensated) result[k] *= 1 + f0_[lane][k] * (1 - albedo_[lane]) / albedo_[lane];
     }
     return result;
+  }
+
+  // i.m of the microfacets that reflect towards o.
+  float to_half_vector(std::size_t lane, const Vector& o) const {
+    Vector i = incident_[lane];
+    if (material(lane).model.retro) i = {-i[0], -i[1], i[2]};
+    return std::sqrt(std::max(0.0f, 0.5f + 0.5f * dot(i, o)));
+  }
+
+  // The base's f cos(theta_o).
+  Color base_value(std::size_t lane, float oz) const {
+    if (oz <= 0) return {};
+    const float f0 = *std::max_element(f0_[lane].begin(), f0_[lane].end());
+    return (oz * kInversePi * (1 - f0 * albedo_[lane])) * base_[lane];
+  }
+  // The density of a direction, by either way of drawing it.
+  static float with_base(float pdf, float oz) {
+    return (1 - kShareOfBase) * pdf + kShareOfBase * kInversePi * std::max(0.0f, oz);
   }
 
   // Light from a direction that the environment chose.
@@ -372,16 +432,17 @@ class Renderer {
     }
     for_lanes(lanes, [&](std::size_t begin, std::size_t end) {
       for (std::size_t lane = begin; lane < end; ++lane) {
-        if (group_[lane] == kLeftOut || !(value_[lane] > 0) || !(light_pdf_[lane] > 0)) continue;
+        if (group_[lane] == kLeftOut || !(light_pdf_[lane] > 0)) continue;
+        const bool base = groups_[group_[lane]].base;
         const Vector o = towards_light_[lane];
+        if (!(value_[lane] > 0) && !(base && o[2] > 0)) continue;
         // On the side of the triangle that the shading normal says.
         if ((dot(shadow_direction_[lane], surface_[lane].facing) > 0) != (o[2] > 0)) continue;
-        Vector i = incident_[lane];
-        if (material(lane).model.retro) i = {-i[0], -i[1], i[2]};
-        const float im = std::sqrt(std::max(0.0f, 0.5f + 0.5f * dot(i, o)));
-        // f cos / pdf times the share of this way of drawing, pdf_light / (pdf_light + pdf).
-        const float weight = value_[lane] / (light_pdf_[lane] + pdf_[lane]);
-        from_light_.set(lane, weight * (now_.throughput[lane] * factor(lane, im) * from_light_[lane]));
+        Color value = value_[lane] * factor(lane, to_half_vector(lane, o));
+        if (base) value = value + base_value(lane, o[2]);
+        const float pdf = base ? with_base(pdf_[lane], o[2]) : pdf_[lane];
+        // f cos / pdf_light times the share of this way of drawing, pdf_light / (pdf_light + pdf).
+        from_light_.set(lane, (1 / (light_pdf_[lane] + pdf)) * (now_.throughput[lane] * value * from_light_[lane]));
         visible_[lane] = 1;
       }
     });
@@ -419,11 +480,41 @@ class Renderer {
       draw.out.weight = {weight_, lanes};
       draw.out.status = {status_.data(), lanes};
       if (dielectric) draw.out.event = {event_.data(), lanes};
+      std::vector<std::uint32_t> above, below;  // lanes drawn by the surface, and by its base
+      if (groups_[group].base) {
+        draw_base(group, bounce, above, below);
+        draw.active = above;
+      }
       const auto status =
           call(dielectric ? Operation::sample_scattering : Operation::sample_reflection, draw, &picture_.sampled);
       if (!status.ok()) return status;
+      if (groups_[group].base) {
+        Batch query = batch(lanes, group);
+        query.active = below;
+        query.outgoing = outgoing_.in(lanes);
+        query.out.value = {value_, lanes};
+        query.out.pdf = {pdf_, lanes};
+        if (auto asked = call(Operation::evaluate_reflection, query); !asked.ok()) return asked;
+      }
     }
     return absl::OkStatus();
+  }
+
+  // Chooses between a surface and its base, and draws the base's directions, by the cosine.
+  void draw_base(std::size_t group, int bounce, std::vector<std::uint32_t>& above, std::vector<std::uint32_t>& below) {
+    for (const std::uint32_t lane : list(group)) {
+      const auto u = numbers(now_.slot[lane], dimension(bounce, Decision::base));
+      from_base_[lane] = u[0] < kShareOfBase;
+      if (!from_base_[lane]) {
+        above.push_back(lane);
+        continue;
+      }
+      below.push_back(lane);
+      const float r = std::sqrt(u[1]), phi = 6.28318531f * u[2];
+      const Vector o = {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0f, 1 - u[1]))};
+      outgoing_.set(lane, normalized(o));
+      status_[lane] = static_cast<std::uint8_t>(o[2] > 0 ? LaneStatus::accepted : LaneStatus::occluded);
+    }
   }
 
   // Decides which paths go on: after this their status is `accepted`, and no other's is.
@@ -438,15 +529,16 @@ class Renderer {
         const std::uint32_t slot = now_.slot[lane];
         rejected_[slot] += status_[lane] == static_cast<std::uint8_t>(LaneStatus::occluded);
         const std::uint8_t status = std::exchange(status_[lane], kEnds);
-        if ((status != static_cast<std::uint8_t>(LaneStatus::accepted) &&
-             status != static_cast<std::uint8_t>(LaneStatus::smooth)) ||
-            !(weight_[lane] > 0))
+        if (status != static_cast<std::uint8_t>(LaneStatus::accepted) &&
+            status != static_cast<std::uint8_t>(LaneStatus::smooth))
           continue;
         const Vector o = outgoing_[lane];
         const Surface& surface = surface_[lane];
         const Vector direction = normalized(surface.frame.to_world(o));
         if ((dot(direction, surface.facing) > 0) != (o[2] > 0)) continue;
-        Color throughput = weight_[lane] * (now_.throughput[lane] * factor(lane, im_[lane]));
+        const Color weight = weight_of(lane, status == static_cast<std::uint8_t>(LaneStatus::smooth));
+        Color throughput = weight * now_.throughput[lane];
+        if (!(*std::max_element(throughput.begin(), throughput.end()) > 0)) continue;
         if (bounce >= kRouletteFrom) {
           const float go = std::min(1.0f, *std::max_element(throughput.begin(), throughput.end()));
           if (!(numbers(slot, dimension(bounce, Decision::roulette))[0] < go)) continue;
@@ -460,6 +552,21 @@ class Renderer {
       }
     });
     picture_.backfacing += std::accumulate(behind.begin(), behind.end(), std::uint64_t{0});
+  }
+
+  // What a path is multiplied by. Where there is a base, pdf_ becomes the density of both ways of drawing.
+  Color weight_of(std::size_t lane, bool smooth) {
+    if (!groups_[group_[lane]].base) return weight_[lane] * factor(lane, im_[lane]);
+    // A mirror's direction has no density: only the surface draws it.
+    if (smooth) return (weight_[lane] / (1 - kShareOfBase)) * factor(lane, im_[lane]);
+    const float oz = outgoing_.z[lane];
+    float value = weight_[lane] * pdf_[lane], im = im_[lane];
+    if (from_base_[lane]) {
+      value = value_[lane];
+      im = to_half_vector(lane, outgoing_[lane]);
+    }
+    pdf_[lane] = with_base(pdf_[lane], oz);
+    return (1 / pdf_[lane]) * (value * factor(lane, im) + base_value(lane, oz));
   }
 
   absl::Status compact(std::size_t& lanes) {
@@ -529,7 +636,8 @@ class Renderer {
   std::vector<std::uint8_t> group_, status_, event_, visible_;
   std::vector<std::uint64_t> id_;
   std::vector<Surface> surface_;
-  std::vector<Color> radiance_;
+  std::vector<Color> radiance_, f0_, base_;
+  std::vector<std::uint8_t> from_base_;
   std::vector<float> surfaces_, rejected_;
 };
 
@@ -616,8 +724,9 @@ absl::StatusOr<Picture> render(const Scene& scene, const Settings& settings, Eng
   auto geometry = Geometry::create(scene.mesh);
   if (!geometry.ok()) return geometry.status();
 
-  const auto started = Clock::now();
   Renderer renderer(scene, settings, engine, **geometry, picture);
+  if (auto status = renderer.prepare(); !status.ok()) return status;
+  const auto started = Clock::now();
   const auto pixels = static_cast<std::uint32_t>(picture.pixels.size());
   const std::uint32_t passes = std::max<std::uint32_t>(1, kWave / pixels);
   for (std::uint32_t first = picture.samples(); first < settings.samples;) {

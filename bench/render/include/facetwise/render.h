@@ -45,6 +45,10 @@ struct Image {
 
 // EXR as linear RGB; PNG, JPEG and the like as they are stored, in [0, 1]. Errors begin with the path.
 absl::StatusOr<Image> load_image(const std::string& path);
+// The same of bytes in memory, of PNG, JPEG and the like. `name` is for errors.
+absl::StatusOr<Image> decode_image(std::string_view bytes, const std::string& name);
+// From sRGB to linear.
+void make_linear(Image& image);
 
 // Moments of the slopes of a displacement map over squares of 1, 2, 4 ... texels: what a surface seen from afar has
 // instead of its relief (LEADR: Dupuy et al. 2013).
@@ -75,8 +79,19 @@ struct Material {
   float alpha_x = 0.3f, alpha_y = 0.3f;
   Color f0 = {1, 1, 1};  // conductor: Schlick's reflectance at normal incidence
   float eta = 1.5f;      // dielectric: inside over outside
+  // A matte base under a conductor: its reflectance, of which the surface above leaves 1 - F E (E: the engine's albedo, F:
+  // the largest of f0). Half of the samples are drawn for it.
+  Color base = {0, 0, 0};
   // Energy compensation (Turquin 2019) of conductors, in colour, by the engine's albedo.
   bool compensated = false;
+  // Maps by the texture coordinates. Colour (linear), which f0 and base share by metalness: f0 of 0.04 to the colour, base of
+  // the colour to 0; roughness (perceptual) in green, metalness in blue. Both multiply the values here.
+  struct Metallic {
+    Color color = {1, 1, 1};
+    float roughness = 1, metalness = 1;
+    std::shared_ptr<const Image> color_map, roughness_map;
+  };
+  std::optional<Metallic> metallic;         // instead of alpha, f0 and base: as glTF has materials
   std::shared_ptr<const Image> normal_map;  // tangent space, 0.5 is 0
   float normal_scale = 1;                   // of its x and y
   // Mean slopes and roughness per lane, from moments over each path's footprint, with alpha as the roughness of the relief
@@ -197,8 +212,8 @@ Picture merge(const Picture& a, const Picture& b);
 
 // --- Scenes ---------------------------------------------------------------------------------------------------------
 
-// A scene from a file that assimp reads (glTF with Draco or without, and others), in an environment. Its metallic
-// roughness becomes GGX conductors.
+// A scene from a file that assimp reads (glTF with Draco or without, and others): metallic roughness as GGX over a matte base,
+// with its maps and normal maps.
 absl::StatusOr<Scene> load_scene(const std::string& path);
 
 // A ball with a groove, a ball within, and a foot, as material previews show it; anisotropy follows the parallels.
