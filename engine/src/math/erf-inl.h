@@ -16,7 +16,7 @@ namespace HWY_NAMESPACE {
 
 inline constexpr float kInverseRootPi = 0.564189584f;
 
-// For x >= 0: erfcx = e^(x^2) erfc(x), relative error 3e-7, and tail = 1 / sqrt(pi) - x erfcx, 4e-7, which falls with
+// For x >= 0: erfcx = e^(x^2) erfc(x), relative error 4e-7, and tail = 1 / sqrt(pi) - x erfcx, 8e-7, which falls with
 // 1 / x^2 and would cancel. Polynomials in (x - 2) / (x + 2), interpolated at Chebyshev nodes, for the
 // functions times 1 + 2 x and (1 + 3 x / 2)^2. Beyond 1e9 they stay.
 template <class D, class V = Vec<D>>
@@ -56,7 +56,7 @@ HWY_INLINE void ErfcxAndTail(D d, V x, V& erfcx, V& tail) {
   tail = q * (inverse_c * inverse_c);
 }
 
-// e^(-x^2), 0 for |x| > 8, so that products with it are not denormal, which processors are slow at (nor what is split
+// e^(-x^2), relative error 1.5e-7, 0 for |x| > 8, so that products with it are not denormal, which processors are slow at (nor what is split
 // from x^2). x^2 is split, so that the exponent's rounding loses no digits.
 template <class D, class V = Vec<D>>
 HWY_INLINE V Gauss(D d, V x) {
@@ -67,7 +67,7 @@ HWY_INLINE V Gauss(D d, V x) {
   return IfThenElseZero(visible, NegFma(e, Fms(x, x, x2), e));
 }
 
-// The share of slopes below x, (1/2) erfc(-x); relative error 1e-6 above 1e-29.
+// The share of slopes below x, (1/2) erfc(-x); relative error 5e-7 above 1e-28.
 template <class D, class V = Vec<D>>
 HWY_INLINE V ShareBelow(D d, V x) {
   V erfcx, tail;
@@ -78,7 +78,7 @@ HWY_INLINE V ShareBelow(D d, V x) {
 
 // The x with a share u below it, given rest = 1 - u too: the smaller one decides, so that tails keep their
 // digits. With y = 1 - 2 u and w = -log(1 - y^2), x / y is smooth in w and, in the tail, in its root (Giles 2010).
-// Error of the share 5e-7, relative 2e-4 in the tails down to 1e-18; beyond, x is finite.
+// Error of the share 2e-7, relative 1.5e-4 in the tails down to 1e-18; beyond, x is finite.
 template <class D, class V = Vec<D>>
 HWY_NOINLINE V NormalSlope(D d, V u, V rest) {
   const V low = Max(Min(u, rest), Set(d, 1e-18f));

