@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <deque>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,12 +50,6 @@ bool known_column(std::string_view name) {
   return any_of(input_fields()) || any_of(output_fields()) || any_of(byte_fields());
 }
 
-std::string known_inputs() {
-  std::string names;
-  for (const InputField& field : input_fields()) names += fmt::format(" {}", file_name(field.name));
-  return names;
-}
-
 // A value that an option gives for all lanes.
 struct Constant {
   float value;
@@ -80,8 +76,6 @@ class Inputs {
   Inputs(const FileCall& call, InputTable& table) : call_(call), table_(table), used_(table.names().size(), false) {}
 
   absl::Status fill(Batch& batch) {
-    for (const std::string& name : table_.names())
-      if (!known_column(name)) return invalid("{}: unknown column {}; known are{}", shown(), name, known_inputs());
     // u3 comes last: by then it is known which sampler the other columns make the default.
     for (const InputField& field : input_fields()) {
       const std::string column = file_name(field.name);
@@ -99,19 +93,50 @@ class Inputs {
       if (auto status = take(column, field.random, field.column(batch)); !status.ok()) return status;
     }
     batch.lanes = table_.rows();
+    if (call_.normalise)
+      for (Direction* direction : {&batch.incident, &batch.outgoing}) normalise(*direction);
     if (call_.seed) batch.generator = {.seed = *call_.seed, .id = {}, .first_id = call_.first_id};
     return absl::OkStatus();
   }
 
+  // Columns that facetwise knows and the call does not read.
   std::vector<std::string> ignored() const {
     std::vector<std::string> names;
     for (std::size_t k = 0; k < used_.size(); ++k)
-      if (!used_[k]) names.push_back(table_.names()[k]);
+      if (!used_[k] && known_column(table_.names()[k])) names.push_back(table_.names()[k]);
     return names;
+  }
+  // Those that it does not know.
+  absl::StatusOr<std::vector<PassedColumn>> passed() {
+    std::vector<PassedColumn> columns;
+    for (std::size_t k = 0; k < used_.size(); ++k) {
+      if (known_column(table_.names()[k])) continue;
+      auto column = table_.passed(k);
+      if (!column.ok()) return column.status();
+      columns.push_back(*std::move(column));
+    }
+    return columns;
   }
 
  private:
   std::string shown() const { return call_.input == "-" ? "standard input" : call_.input; }
+
+  // To unit length, in double; what has no length stays as it is.
+  void normalise(Direction& direction) {
+    if (!direction.x.present()) return;
+    std::vector<float> unit[3];
+    for (std::size_t lane = 0; lane < table_.rows(); ++lane) {
+      const double x = direction.x[lane], y = direction.y[lane], z = direction.z[lane];
+      const double length = std::sqrt(x * x + y * y + z * z);
+      const double scale = length > 0 && std::isfinite(length) ? 1 / length : 1;
+      unit[0].push_back(static_cast<float>(scale * x));
+      unit[1].push_back(static_cast<float>(scale * y));
+      unit[2].push_back(static_cast<float>(scale * z));
+    }
+    std::size_t k = 0;
+    for (Column<float>* column : {&direction.x, &direction.y, &direction.z})
+      *column = normalised_.emplace_back(std::move(unit[k++]));
+  }
 
   int find(std::string_view name) const {
     const auto names = table_.names();
@@ -139,12 +164,13 @@ class Inputs {
   const FileCall& call_;
   InputTable& table_;
   std::vector<bool> used_;
+  std::deque<std::vector<float>> normalised_;
 };
 
 }  // namespace
 
 absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine) {
-  auto input = read_table(call.input);
+  auto input = read_table(call.input, call.columns);
   if (!input.ok()) return input.status();
   Batch batch;
   batch.model = call.model;
@@ -156,11 +182,16 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   TableColumns names{.floats = {}, .bytes = {}};
   for (const OutputField* field : fields) names.floats.push_back(file_name(field->name));
   for (const ByteField* field : bytes) names.bytes.push_back(file_name(field->name));
+  auto passed = inputs.passed();
+  if (!passed.ok()) return passed.status();
+  names.passed = *std::move(passed);
   auto output = create_table(call.output, names, batch.lanes);
   if (!output.ok()) return output.status();
   for (std::size_t k = 0; k < fields.size(); ++k) fields[k]->column(batch) = (*output)->column(k);
   for (std::size_t k = 0; k < bytes.size(); ++k) bytes[k]->column(batch) = (*output)->byte_column(k);
 
+  std::vector<std::string> passed_names;
+  for (const PassedColumn& column : names.passed) passed_names.push_back(column.name);
   const auto start = std::chrono::steady_clock::now();
   auto statistics = engine.run(call.operation, batch);
   if (!statistics.ok()) return statistics.status();
@@ -171,6 +202,7 @@ absl::StatusOr<FileCallResult> run_on_files(const FileCall& call, Engine& engine
   return FileCallResult{.statistics = *statistics,
                         .sampler = batch.sampler,
                         .ignored = inputs.ignored(),
+                        .passed = std::move(passed_names),
                         .backfacing = backfacing,
                         .seconds = seconds.count()};
 }

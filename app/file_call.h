@@ -22,12 +22,15 @@ struct FileCall {
   std::optional<std::uint64_t> seed;  // of the generator; else columns u1, u2, u3
   std::uint64_t first_id = 0;
   std::string input = "-", output = "-";
+  std::vector<std::string> columns;  // names of a plain .npy array's columns
+  bool normalise = false;            // directions to unit length first
 };
 
 struct FileCallResult {
   Statistics statistics;
   Sampler sampler;                   // that was used
   std::vector<std::string> ignored;  // columns that facetwise knows and this call does not read
+  std::vector<std::string> passed;   // columns that it does not know, which are in the output as they were
   std::size_t backfacing = 0;        // lanes with i_z <= 0
   double seconds = 0;                // of the call, without reading and writing
 };

@@ -18,9 +18,12 @@
 namespace facetwise::app {
 namespace {
 
-constexpr const char* kFiles = R"(Files are .csv, .npy, or "-" for CSV through standard input and output.
-CSV: a header line with the columns' names, then one line per lane.
-.npy: a one-dimensional structured array whose fields are little-endian float32 ('<f4').
+constexpr const char* kFiles =
+    R"(Files are .csv, .npy, to be read also .npz, or "-" for CSV through standard input and output.
+CSV: a header line with the columns' names, then one line per lane; commas, or semicolons or tabs.
+.npy: a one-dimensional structured array of float32 (read where they lie if little-endian), float64 or float16; or a plain
+array (N, k) with --columns. .npz: a one-dimensional array for each column.
+Columns that are not known (ids, names) are in the output as they were.
   ix iy iz         incident direction, a unit vector in the local frame that points away from the surface
   alpha_x alpha_y  roughness: the distribution's own parameter, 1e-4 to 10, phong to 1 (or --alpha)
   mean_slope_x mean_slope_y slope_correlation
@@ -101,7 +104,8 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
                                          {"invalid", s.invalid},
                                          {"backfacing", result.backfacing},
                                          {"seconds", result.seconds},
-                                         {"ignored_columns", result.ignored}};
+                                         {"ignored_columns", result.ignored},
+                                         {"passed_columns", result.passed}};
     fmt::print(stderr, "{}\n", json.dump());
     return;
   }
@@ -113,6 +117,8 @@ void report(const std::string& verb, const FileVerb& verb_arguments, const FileC
       1e3 * result.seconds);
   if (!result.ignored.empty())
     fmt::print(stderr, "facetwise {}: columns not read: {}\n", verb, fmt::join(result.ignored, " "));
+  if (!result.passed.empty())
+    fmt::print(stderr, "facetwise {}: columns not known, passed on: {}\n", verb, fmt::join(result.passed, " "));
 }
 
 Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, std::span<const Variant> variants,
@@ -125,6 +131,12 @@ Verb add_file_verb(CLI::App& app, const std::string& verb, Operation operation, 
   command.add_option("-i,--input", call.input, "File with one lane per row; default -")->type_name("FILE");
   command.add_option("-o,--output", call.output, "File to write; default -. It appears when it is complete")
       ->type_name("FILE");
+  command.add_option("--columns", call.columns, "Names of the columns of a plain .npy array, with commas between them")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->option_text("NAME,NAME...");
+  command.add_flag("--normalise", call.normalise,
+                   "Bring directions to unit length first: those of float16 or interpolation are a little off");
   arguments->model.add(command);
   if (has_sampler(operation))
     add_named(command, "--sampler", arguments->sampler, parse_sampler,

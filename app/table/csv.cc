@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <deque>
 #include <optional>
 #include <utility>
 
@@ -27,14 +28,36 @@ std::string_view trim(std::string_view text) {
 
 bool blank(std::string_view text) { return text.find_first_not_of(" \t\r\n") == std::string_view::npos; }
 
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> values;
-  for (;;) {
-    const auto comma = line.find(',');
-    values.push_back(trim(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return values;
-    line.remove_prefix(comma + 1);
+// Takes the first value from the line, and says whether another follows. `quoted` keeps what had quotes within quotes.
+struct Cell {
+  std::string_view text;
+  bool more = false, broken = false;
+};
+Cell next_cell(std::string_view& line, char separator, std::deque<std::string>& quoted) {
+  Cell cell;
+  const std::string_view rest =
+      line.substr(std::min(line.find_first_not_of(separator == '\t' ? " " : " \t"), line.size()));
+  if (rest.starts_with('"')) {
+    std::string text;
+    std::size_t at = 1;
+    for (; at < rest.size(); ++at) {
+      if (rest[at] == '"' && !(at + 1 < rest.size() && rest[at + 1] == '"')) break;
+      if (rest[at] == '"') ++at;
+      text.push_back(rest[at]);
+    }
+    line = rest.substr(std::min(at + 1, rest.size()));
+    const auto end = line.find(separator);
+    cell.broken = at >= rest.size() || !trim(line.substr(0, end)).empty();
+    cell.text = quoted.emplace_back(std::move(text));
+    cell.more = end != std::string_view::npos;
+    line.remove_prefix(cell.more ? end + 1 : line.size());
+    return cell;
   }
+  const auto end = line.find(separator);
+  cell.text = trim(line.substr(0, end));
+  cell.more = end != std::string_view::npos;
+  line.remove_prefix(cell.more ? end + 1 : line.size());
+  return cell;
 }
 
 // Takes the first line, without its end, from the text.
@@ -61,55 +84,91 @@ std::optional<float> parse_float(std::string_view text) {
   return value;
 }
 
+// Values are kept as text, since only some columns are read as numbers.
 class CsvInput final : public InputTable {
  public:
-  absl::Status parse(const std::string& path, std::string_view text) {
+  absl::Status parse(const std::string& path, std::string whole) {
+    path_ = path;
+    text_ = std::move(whole);
+    std::string_view text = text_;
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
     if (blank(text)) return invalid("{}: empty; the first line names the columns", path);
-    for (const std::string_view name : split(next_line(text))) {
-      if (name.empty()) return invalid("{}, line 1: a column without a name", path);
-      if (std::find(names_.begin(), names_.end(), name) != names_.end())
-        return invalid("{}, line 1: column {} twice", path, name);
-      names_.emplace_back(name);
+    std::string_view header = next_line(text);
+    for (const char separator : {',', ';', '\t'})
+      if (header.find(separator_ = separator) != std::string_view::npos) break;
+    if (header.find(separator_) == std::string_view::npos) separator_ = ',';
+    for (bool more = true; more;) {
+      const Cell cell = next_cell(header, separator_, quoted_);
+      more = cell.more;
+      if (cell.broken) return invalid("{}, line 1: a quote without its end, or text behind it", path);
+      if (cell.text.empty()) return invalid("{}, line 1: a column without a name", path);
+      if (std::find(names_.begin(), names_.end(), cell.text) != names_.end())
+        return invalid("{}, line 1: column {} twice", path, cell.text);
+      names_.emplace_back(cell.text);
     }
-    columns_.resize(names_.size());
-    const auto expected = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) + 1;
-    for (auto& column : columns_) column.reserve(expected);
+    cells_.reserve(names_.size() * (static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) + 1));
     for (std::size_t number = 2; !text.empty(); ++number) {
       const std::string_view line = next_line(text);
       if (blank(line) && blank(text)) break;
-      if (auto status = parse_row(path, number, line); !status.ok()) return status;
+      if (auto status = parse_row(number, line); !status.ok()) return status;
     }
     return absl::OkStatus();
   }
 
-  std::size_t rows() const override { return columns_.front().size(); }
+  std::size_t rows() const override { return cells_.size() / names_.size(); }
   std::span<const std::string> names() const override { return names_; }
-  absl::StatusOr<Column<float>> column(std::size_t index) override { return Column<float>(columns_[index]); }
+
+  absl::StatusOr<Column<float>> column(std::size_t index) override {
+    auto& values = columns_.emplace_back();
+    values.reserve(rows());
+    for (std::size_t row = 0; row < rows(); ++row) {
+      const std::string_view text = cell(row, index);
+      const std::optional<float> value = parse_float(text);
+      if (!value) return invalid("{}, line {}, column {}: \"{}\" is not a number", path_, row + 2, names_[index], text);
+      values.push_back(*value);
+    }
+    return Column<float>(values);
+  }
+
+  absl::StatusOr<PassedColumn> passed(std::size_t index) override {
+    std::size_t longest = 1;
+    for (std::size_t row = 0; row < rows(); ++row) longest = std::max(longest, cell(row, index).size());
+    std::string& block = blocks_.emplace_back(longest * rows(), '\0');
+    for (std::size_t row = 0; row < rows(); ++row) cell(row, index).copy(&block[longest * row], longest);
+    return PassedColumn{names_[index], fmt::format("|S{}", longest), block.data(), longest, longest};
+  }
 
  private:
-  absl::Status parse_row(const std::string& path, std::size_t number, std::string_view line) {
+  std::string_view cell(std::size_t row, std::size_t column) const { return cells_[row * names_.size() + column]; }
+
+  absl::Status parse_row(std::size_t number, std::string_view line) {
     std::size_t column = 0;
     for (bool more = true; more; ++column) {
-      const auto comma = line.find(',');
-      more = comma != std::string_view::npos;
-      if (column < columns_.size()) {
-        const std::string_view text = trim(line.substr(0, comma));
-        const std::optional<float> value = parse_float(text);
-        if (!value)
-          return invalid("{}, line {}, column {}: \"{}\" is not a number", path, number, names_[column], text);
-        columns_[column].push_back(*value);
-      }
-      line.remove_prefix(more ? comma + 1 : line.size());
+      const Cell cell = next_cell(line, separator_, quoted_);
+      more = cell.more;
+      if (cell.broken) return invalid("{}, line {}: a quote without its end, or text behind it", path_, number);
+      if (column < names_.size()) cells_.push_back(cell.text);
     }
-    if (column != columns_.size())
-      return invalid("{}, line {}: {} values for {} columns", path, number, column, columns_.size());
+    if (column != names_.size())
+      return invalid("{}, line {}: {} values for {} columns", path_, number, column, names_.size());
     return absl::OkStatus();
   }
 
+  std::string path_, text_;
+  char separator_ = ',';
+  std::deque<std::string> quoted_, blocks_;
   std::vector<std::string> names_;
-  std::vector<std::vector<float>> columns_;
+  std::vector<std::string_view> cells_;  // row by row
+  std::deque<std::vector<float>> columns_;
 };
+
+// Within quotes where it would not be one value without.
+std::string in_quotes(std::string text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos && trim(text) == text) return text;
+  std::string result = "\"";
+  for (const char c : text) result.append(c == '"' ? 2 : 1, c);
+  return result + "\"";
+}
 
 class CsvOutput final : public OutputTable {
  public:
@@ -129,10 +188,12 @@ class CsvOutput final : public OutputTable {
     fmt::memory_buffer text;
     const auto append = [&](std::string_view piece) { text.append(piece.data(), piece.data() + piece.size()); };
     const auto end_line = [&] { text[text.size() - 1] = '\n'; };  // instead of the last comma
+    for (const auto& column : names_.passed) append(in_quotes(column.name)), append(",");
     for (const auto& name : names_.floats) append(name), append(",");
     for (const auto& name : names_.bytes) append(name), append(",");
     end_line();
     for (std::size_t row = 0; row < rows_; ++row) {
+      for (const auto& column : names_.passed) append(in_quotes(passed_text(column, row).value_or(""))), append(",");
       for (const auto& column : columns_) fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
       for (const auto& column : bytes_) fmt::format_to(fmt::appender(text), FMT_COMPILE("{},"), column[row]);
       end_line();
@@ -162,7 +223,7 @@ class CsvOutput final : public OutputTable {
 
 absl::StatusOr<std::unique_ptr<InputTable>> parse_csv(const std::string& path, std::string text) {
   auto table = std::make_unique<CsvInput>();
-  if (auto status = table->parse(shown(path), text); !status.ok()) return status;
+  if (auto status = table->parse(shown(path), std::move(text)); !status.ok()) return status;
   return table;
 }
 
@@ -186,6 +247,9 @@ absl::StatusOr<std::unique_ptr<InputTable>> read_csv(const std::string& path) {
 
 absl::StatusOr<std::unique_ptr<OutputTable>> create_csv(const std::string& path, const TableColumns& columns,
                                                         std::size_t rows) {
+  for (const PassedColumn& column : columns.passed)
+    if (rows > 0 && !passed_text(column, 0))
+      return invalid("{}: column {} has the type {}, which CSV has no text for", path, column.name, column.type);
   std::optional<OutputFile> file;
   if (path != "-") {
     auto created = OutputFile::create(path);

@@ -147,8 +147,6 @@ absl::StatusOr<std::size_t> field_bytes(const Literal& type, const std::string& 
 }
 
 absl::Status read_fields(const Literal& descr, NpyHeader& header) {
-  if (descr.kind != Literal::Kind::list)
-    return invalid("not a structured array: it needs named float32 fields, as in dtype=[('ix', '<f4'), ...]");
   for (const Literal& item : descr.items) {
     if (item.kind != Literal::Kind::tuple || item.items.size() < 2 || item.items.size() > 3)
       return invalid("malformed header: a field of descr is not (name, type)");
@@ -164,6 +162,7 @@ absl::Status read_fields(const Literal& descr, NpyHeader& header) {
       *bytes = product(*bytes, elements(item.items[2]));
       field.type = "an array of " + field.type;
     }
+    field.bytes = *bytes;
     header.record_bytes = sum(header.record_bytes, *bytes);
     if (field.name.empty()) continue;  // padding
     for (const NpyField& other : header.fields)
@@ -173,9 +172,31 @@ absl::Status read_fields(const Literal& descr, NpyHeader& header) {
   return absl::OkStatus();
 }
 
+// A plain array: rows of as many values as there are names, or columns one after another in Fortran's order.
+absl::Status read_array(const Literal& type, const Literal& shape, bool fortran, std::span<const std::string> names,
+                        NpyHeader& header, std::size_t& data_bytes) {
+  const auto bytes = field_bytes(type, "of the array");
+  if (!bytes.ok()) return bytes.status();
+  if (names.empty())
+    return invalid("a plain array, whose columns have no names: give them, as in --columns ix,iy,iz,alpha_x,alpha_y");
+  if (shape.items.empty() || shape.items.size() > 2)
+    return invalid("an array of {} dimensions; one or two are needed", shape.items.size());
+  const std::size_t columns = shape.items.size() == 1 ? 1 : shape.items[1].integer;
+  if (columns != names.size()) return invalid("{} columns, and {} names for them", columns, names.size());
+  header.rows = shape.items[0].integer;
+  header.record_bytes = fortran ? *bytes : product(columns, *bytes);
+  data_bytes = product(header.rows, product(columns, *bytes));
+  for (std::size_t k = 0; k < columns; ++k)
+    header.fields.push_back({.name = names[k],
+                             .type = type.text,
+                             .offset = product(k, fortran ? product(header.rows, *bytes) : *bytes),
+                             .bytes = *bytes});
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::StatusOr<NpyHeader> parse_npy_header(std::string_view file) {
+absl::StatusOr<NpyHeader> parse_npy_header(std::string_view file, std::span<const std::string> names) {
   if (!file.starts_with("\x93NUMPY")) return invalid("not a .npy file: it does not begin with \\x93NUMPY");
   const auto byte = [&](std::size_t k) { return std::size_t{static_cast<std::uint8_t>(file[k])}; };
   if (file.size() < 10) return invalid("truncated in the header");
@@ -195,12 +216,22 @@ absl::StatusOr<NpyHeader> parse_npy_header(std::string_view file) {
     return invalid("malformed header: no descr and shape in it");
 
   NpyHeader header;
-  if (auto status = read_fields(*descr, header); !status.ok()) return status;
-  if (shape->items.size() != 1)
-    return invalid("an array of {} dimensions; one is needed (numpy: array.ravel())", shape->items.size());
-  header.rows = shape->items[0].integer;
   header.data_offset = begin + length;
-  const std::size_t needed = sum(header.data_offset, product(header.rows, header.record_bytes));
+  std::size_t data_bytes = 0;
+  if (descr->kind == Literal::Kind::string) {
+    const Literal* order = literal->find("fortran_order");
+    const bool fortran = order != nullptr && order->integer != 0;
+    if (auto status = read_array(*descr, *shape, fortran, names, header, data_bytes); !status.ok()) return status;
+  } else {
+    if (descr->kind != Literal::Kind::list) return invalid("malformed header: descr is no type");
+    if (!names.empty()) return invalid("it names its columns itself; --columns is for plain arrays");
+    if (auto status = read_fields(*descr, header); !status.ok()) return status;
+    if (shape->items.size() != 1)
+      return invalid("an array of {} dimensions; one is needed (numpy: array.ravel())", shape->items.size());
+    header.rows = shape->items[0].integer;
+    data_bytes = product(header.rows, header.record_bytes);
+  }
+  const std::size_t needed = sum(header.data_offset, data_bytes);
   if (needed > file.size())
     return invalid("truncated: {} records of {} bytes need {} bytes, the file has {}", header.rows, header.record_bytes,
                    needed, file.size());

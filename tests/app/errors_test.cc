@@ -29,8 +29,6 @@ TEST(Errors, Columns) {
                  "standard input: no column alpha_y (or give --alpha)");
   expect_failure({"sample", "--seed", "1", "--alpha", "1"}, "ix,iz\n", "standard input: no column iy");
   expect_failure({"pdf", "--alpha", "1"}, "ix,iy,iz,ox,oy\n", "standard input: no column oz");
-  expect_failure({"sample", "--seed", "1", "--alpha", "1"}, "ix,iy,iz,colour\n",
-                 "standard input: unknown column colour");
   expect_failure({"sample", "--seed", "1", "--alpha", "1"}, "ix,iy,iz,u2\n",
                  "--seed: standard input has a column u2 too");
   expect_failure({"sample", "--seed", "1", "--alpha", "1"}, "ix,iy,iz,alpha_y\n",
@@ -57,16 +55,15 @@ TEST(Errors, NpyFiles) {
                         "'shape': (2,), }",
                     std::string(2 * (8 + bytes), '\0'));
   };
-  expect(with_type("<f8", 8), "field iy is <f8; it must be little-endian float32, '<f4' (numpy: array.astype)");
-  expect(with_type(">f4", 4), "field iy is >f4; it must be");
-  expect(with_type("<i4", 4), "field iy is <i4; it must be");
+  expect(with_type("<i4", 4), "field iy is <i4; it must be float32, float64 or float16 (numpy: array.astype)");
+  expect(with_type("<c8", 8), "field iy is <c8; it must be");
   expect(with_type("<f4", 3), "truncated: 2 records of 12 bytes need");
   expect("", "empty");
   expect("ix,iy,iz\n", "not a .npy file");
   std::filesystem::remove(in);
   expect_failure({"sample", "--seed", "1", "--alpha", "1", "--input", in}, "", in + ": No such file or directory");
   expect_failure({"sample", "--seed", "1", "--alpha", "1", "--input", directory.path("in.txt")}, "",
-                 "in.txt: a file is named .csv or .npy");
+                 "in.txt: a file is named .csv, .npy or");
 }
 
 TEST(Errors, Calls) {

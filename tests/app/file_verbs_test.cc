@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "tests/app/command.h"
@@ -239,7 +240,8 @@ TEST(Sample, BadLanesAreCountedNotErrors) {
       "ix,iy,iz,alpha_x,alpha_y,pdf\n0,0,1,.5,.5,0\nnan,0,1,.5,.5,0\n0,0,2,.5,.5,0\n0,0,1,5e-5,.5,0\n";
   const auto text = facetwise({"sample", "--seed", "1"}, lanes);
   ASSERT_EQ(text.code, 0);
-  EXPECT_NE(text.err.find("4 lanes, 0 backfacing: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos) << text.err;
+  EXPECT_NE(text.err.find("4 lanes, 0 backfacing: 1 accepted, 0 occluded, 1 smooth, 2 invalid"), std::string::npos)
+      << text.err;
   EXPECT_NE(text.err.find("columns not read: pdf"), std::string::npos) << text.err;
   const auto json = facetwise({"sample", "--seed", "1", "--json"}, lanes);
   EXPECT_EQ(json.out, text.out);
@@ -249,6 +251,68 @@ TEST(Sample, BadLanesAreCountedNotErrors) {
   EXPECT_EQ(statistics["smooth"], 1);
   EXPECT_EQ(statistics["invalid"], 2);
   EXPECT_EQ(statistics["ignored_columns"], nlohmann::json::array({"pdf"}));
+}
+
+// Columns that facetwise does not know are in the output as they were, from each format to each.
+TEST(Sample, UnknownColumnsArePassedOn) {
+  const Directory directory;
+  const std::string rows =
+      "name,ix,iy,iz,id,\"a, b\"\n\"Ann \"\"A\"\"\",0,0,1,9007199254740993,x\nÉva,0.6,0,0.8,-2,\"y, z\"\n";
+  const auto text = facetwise({"sample", "--alpha", "0.5", "--seed", "1"}, rows);
+  ASSERT_EQ(text.code, 0) << text.err;
+  EXPECT_NE(text.err.find("not known, passed on: name id a, b"), std::string::npos) << text.err;
+  EXPECT_TRUE(text.out.starts_with("name,id,\"a, b\",ox,")) << text.out;
+  EXPECT_NE(text.out.find("\n\"Ann \"\"A\"\"\",9007199254740993,x,"), std::string::npos) << text.out;
+  EXPECT_NE(text.out.find("\nÉva,-2,\"y, z\","), std::string::npos) << text.out;
+
+  // To .npy, and from there back to CSV.
+  const std::string npy = directory.path("samples.npy"), again = directory.path("again.csv");
+  ASSERT_EQ(facetwise({"sample", "--alpha", "0.5", "--seed", "1", "--output", npy}, rows).code, 0);
+  const std::string python = R"(
+import numpy, sys
+a = numpy.load(sys.argv[1])
+assert a['name'].tolist() == ['Ann "A"'.encode(), 'Éva'.encode()], a['name']
+assert a['id'].tolist() == [b'9007199254740993', b'-2'], a['id']
+assert a['a, b'].tolist() == [b'x', b'y, z']
+b = numpy.zeros(2, dtype=[('n', '<U3'), ('ix', '>f8'), ('iy', '<f2'), ('iz', '<f4'), ('id', '>i8'), ('flag', '?')])
+b['n'], b['ix'], b['iz'], b['id'], b['flag'] = ['Éva', '𝛼'], [0, .6], [1, .8], [2**62, -5], [True, False]
+numpy.save(sys.argv[2], b)
+numpy.savez_compressed(sys.argv[3], **{name: b[name] for name in b.dtype.names})
+numpy.save(sys.argv[4], numpy.array([[0, 0, 1], [.6, 0, .8]]))
+)";
+  const std::string fields = directory.path("fields.npy"), zipped = directory.path("zipped.npz"),
+                    plain = directory.path("plain.npy");
+  write_file(directory.path("check.py"), python);
+  const std::string command =
+      "/usr/bin/python3 " + directory.path("check.py") + " " + npy + " " + fields + " " + zipped + " " + plain;
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const auto expected = facetwise({"sample", "--alpha", "0.5", "--seed", "1"}, "ix,iy,iz\n0,0,1\n0.6,0,0.8\n");
+  for (const std::string& input : {fields, zipped}) {
+    const auto result = facetwise({"sample", "--alpha", "0.5", "--seed", "1", "--input", input});
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_TRUE(result.out.starts_with("n,id,flag,ox,")) << result.out;
+    EXPECT_NE(result.out.find("\nÉva,4611686018427387904,True,"), std::string::npos) << result.out;
+    EXPECT_NE(result.out.find("\n𝛼,-5,False,"), std::string::npos) << result.out;
+    // The same samples.
+    const std::string last = expected.out.substr(expected.out.rfind('\n', expected.out.size() - 2) + 1);
+    EXPECT_TRUE(result.out.ends_with("False," + last)) << result.out;
+  }
+  const auto array = facetwise({"sample", "--alpha", "0.5", "--seed", "1", "--input", plain, "--columns", "ix,iy,iz"});
+  EXPECT_EQ(array.out, expected.out) << array.err;
+  write_file(directory.path("broken.npz"), read_file(zipped).substr(0, 100));
+  const auto broken = facetwise({"sample", "--alpha", "0.5", "--seed", "1", "--input", directory.path("broken.npz")});
+  EXPECT_EQ(broken.code, 1);
+  EXPECT_NE(broken.err.find("broken.npz"), std::string::npos) << broken.err;
+}
+
+TEST(Sample, DirectionsAreNormalisedWhenAsked) {
+  const std::string end = "0,0,0\nnan,0,1\n", rows = "ix,iy,iz\n0,0,1.25\n" + end, unit = "ix,iy,iz\n0,0,1\n" + end;
+  const auto without = facetwise({"sample", "--alpha", "0.5", "--seed", "1"}, rows);
+  const auto with = facetwise({"sample", "--alpha", "0.5", "--seed", "1", "--normalise"}, rows);
+  ASSERT_EQ(with.code, 0) << with.err;
+  EXPECT_NE(without.err.find("3 invalid"), std::string::npos) << without.err;
+  EXPECT_NE(with.err.find("2 invalid"), std::string::npos) << with.err;
+  EXPECT_EQ(with.out, facetwise({"sample", "--alpha", "0.5", "--seed", "1"}, unit).out);
 }
 
 TEST(Sample, AFileMayReplaceItsInput) {
