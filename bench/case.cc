@@ -1,6 +1,7 @@
 #include "case.h"
 
 #include <re2/re2.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <span>
@@ -15,6 +16,9 @@ namespace {
 
 constexpr std::size_t kBatch = 65536, kLargestBatch = kFreshLanes;
 constexpr std::size_t kBatches[] = {256, 4096, kBatch, std::size_t{1} << 20, kLargestBatch};
+// How the kernels scale, beside kBatches: the last needs gigabytes.
+constexpr std::size_t kQuickScaling[] = {1024, std::size_t{1} << 20, kLargestBatch};
+constexpr std::size_t kStandardScaling[] = {1024, std::size_t{16384}, 100000000};
 // Mixed roughness first (Case).
 constexpr std::pair<float, float> kAlphas[] = {{0, 0}, {0.3f, 0.3f}, {0.8f, 0.1f}, {0.01f, 0.01f}, {1.0f, 1.0f}};
 constexpr Implementation kImplementations[] = {Implementation::scalar,       Implementation::auto_vectorised,
@@ -40,8 +44,23 @@ bool has_auto(const Case& which) {
   return which.is_ggx_smith() && has_baseline(which) && which.inputs != Inputs::one_roughness;
 }
 
+// Whether a case's columns leave half of the free memory free.
+bool fits_into_memory(const Case& which) {
+  const double bytes = 4.0 * (which.input_columns() + which.output_columns()) * static_cast<double>(which.lanes());
+  const double free = static_cast<double>(sysconf(_SC_AVPHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  return 2 * bytes < free;
+}
+
 class List {
  public:
+  // The kernels only, on one thread and on all.
+  void add_simd(Case which) {
+    if (which.batch > kLargestBatch && !fits_into_memory(which)) return;
+    for (const Implementation implementation : {Implementation::simd, Implementation::simd_threads}) {
+      which.implementation = implementation;
+      cases_.push_back(which);
+    }
+  }
   // Every implementation that can run `which`.
   void add(Case which) {
     for (const Implementation implementation : kImplementations) {
@@ -108,6 +127,8 @@ std::vector<Case> quick_cases() {
   for (int k = 1; k < 3; ++k)
     for (const Sampler sampler : kReflectionSamplers)
       list.add({.sampler = sampler, .alpha_x = kAlphas[k].first, .alpha_y = kAlphas[k].second});
+  for (const Sampler sampler : kMemorySamplers)
+    for (const std::size_t batch : kQuickScaling) list.add_simd({.sampler = sampler, .batch = batch});
   add_shown_models(list, kAlphas[0].first, kAlphas[0].second);
   return list.take();
 }
@@ -120,6 +141,8 @@ std::vector<Case> standard_cases() {
   for (const Sampler sampler : kMemorySamplers)
     for (const std::size_t batch : kBatches)
       if (batch != kBatch) list.add({.sampler = sampler, .batch = batch});
+  for (const Sampler sampler : kMemorySamplers)
+    for (const std::size_t batch : kStandardScaling) list.add_simd({.sampler = sampler, .batch = batch});
   for (const std::size_t batch : {kBatch, kLargestBatch})
     for (const Sampler sampler : kMemorySamplers)
       list.add({.sampler = sampler, .batch = batch, .inputs = Inputs::malloc_placed});
@@ -161,6 +184,8 @@ std::vector<Case> all_cases() {
       }
     }
   }
+  for (const Sampler sampler : kMemorySamplers)
+    for (const std::size_t batch : kStandardScaling) list.add_simd({.sampler = sampler, .batch = batch});
   for (const auto& [alpha_x, alpha_y] : kAlphas)
     for (Case which : model_cases()) {
       which.alpha_x = alpha_x;

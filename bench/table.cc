@@ -44,6 +44,7 @@ std::vector<Row> rows_of(const std::vector<BenchResult>& results) {
 }
 
 std::string batch_text(std::uint64_t batch) {
+  if (batch >= 1000000 && batch % 1000000 == 0) return fmt::format("{} M", batch / 1000000);
   if (batch >= 1 << 20 && batch % (1 << 20) == 0) return fmt::format("{} M", batch >> 20);
   if (batch >= 1 << 10 && batch % (1 << 10) == 0) return fmt::format("{} k", batch >> 10);
   return fmt::format("{}", batch);

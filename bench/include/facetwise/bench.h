@@ -17,7 +17,7 @@ namespace facetwise {
 
 enum class BenchSuite {
   standard,  // what shows the headline: three minutes
-  quick,     // the same at 64 k lanes only, fewer operations: a minute and a half
+  quick,     // the same at 64 k lanes, fewer operations, two samplers at other sizes: a minute and a half
   full,      // every operation, sampler, implementation, batch and roughness: about an hour
 };
 
