@@ -7,6 +7,7 @@
 
 #include "app/arguments.h"
 #include "app/benchmark_messages.h"
+#include "app/errors.h"
 #include "app/verbs.h"
 #include "facetwise/server.h"
 
@@ -18,11 +19,18 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 struct ServeVerb {
   ServerOptions options;
   std::size_t max_message_mib = 16, max_mib_in_flight = 1024;
-  int drain_seconds = 10;
+  int drain_seconds = 10, read_seconds = 20, stream_idle_seconds = 300;
   std::string unix_mode = "0600";
 
   int run() {
+    if (max_mib_in_flight < 3 * max_message_mib)
+      return fail("serve",
+                  invalid("--max-mib-in-flight: {} is below three times --max-message-mib ({}), which one call may "
+                          "hold; it could never be answered",
+                          max_mib_in_flight, max_message_mib));
     options.max_message_bytes = max_message_mib * kMiB;
+    options.read_timeout = std::chrono::seconds(read_seconds);
+    options.stream_idle_timeout = std::chrono::seconds(stream_idle_seconds);
     options.max_bytes_in_flight = max_mib_in_flight * kMiB;
     options.drain_timeout = std::chrono::seconds(drain_seconds);
     options.unix_mode = static_cast<unsigned>(std::stoul(unix_mode, nullptr, 8));
@@ -50,8 +58,8 @@ Verb add_serve(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("serve", "Answer the library's calls over gRPC until SIGTERM");
   command.footer(
       R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol
-is proto/facetwise/v1/sampler.proto; health checks and reflection are on. There is no authentication:
-listen on a Unix socket, on 127.0.0.1, or on a network whose every user may call.
+is proto/facetwise/v1/sampler.proto; health checks and reflection are on. There is no authentication: listen on a Unix
+socket or on 127.0.0.1; with --insecure on a network whose every user may call.
 
 Examples:
   facetwise serve --listen unix:/tmp/facetwise.sock
@@ -66,7 +74,7 @@ Examples:
       ->check(CLI::Range(1, 4096))
       ->option_text("N");
   command.add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
-      ->check(CLI::Range(1, 2047))
+      ->check(CLI::Range(1, 1024))
       ->option_text("N");
   command
       .add_option("--max-mib-in-flight", arguments->max_mib_in_flight,
@@ -77,6 +85,16 @@ Examples:
       .add_option("--max-calls", options.max_calls, "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
       ->check(CLI::Range(1, 1 << 20))
       ->option_text("N");
+  command.add_option("--read-seconds", arguments->read_seconds, "Longest wait for a call's message; default 20")
+      ->check(CLI::Range(1, 86400))
+      ->option_text("N");
+  command
+      .add_option("--stream-idle-seconds", arguments->stream_idle_seconds,
+                  "Longest wait for a stream's next message; default 300")
+      ->check(CLI::Range(1, 86400))
+      ->option_text("N");
+  command.add_flag("--insecure", options.insecure,
+                   "Allow --listen on addresses that other machines reach, without encryption or authentication");
   command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
       ->check(check_mode)
       ->option_text("MODE");

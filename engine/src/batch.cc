@@ -20,6 +20,7 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
         absl::StrCat("target: this CPU or build has no ", absl::string_view(wanted.data(), wanted.size())));
   }
   Plan plan;
+  plan.stop = execution.stop;
   plan.compensated = compensated_output(operation, batch.model, columns);
   std::shared_ptr<const AlbedoTable> albedo;
   if (operation == Operation::albedo || plan.compensated != kOutputs) {
@@ -56,6 +57,8 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
     });
     statistics = {.occluded = occluded, .smooth = smooth, .invalid = invalid};
   }
+  if (plan.stop != nullptr && plan.stop->load(std::memory_order_relaxed))
+    return absl::CancelledError("stopped before all lanes were done");
   statistics.accepted = plan.positions - statistics.lanes();
   return statistics;
 }

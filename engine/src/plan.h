@@ -14,6 +14,7 @@ struct Plan {
   const TargetKernels* table = nullptr;
   Kernel kernel = nullptr;
   std::size_t positions = 0;  // lanes, or entries of the active list
+  const std::atomic<bool>* stop = nullptr;
   const std::uint32_t* active = nullptr;
   const Generator* generator = nullptr;
   bool generates_u3 = false;

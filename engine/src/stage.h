@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -31,6 +32,7 @@ class Stage {
     Statistics statistics;
     const std::size_t most = plan_.buffers ? kStaged : kInPlace;
     while (begin < end) {
+      if (plan_.stop != nullptr && plan_.stop->load(std::memory_order_relaxed)) break;
       const bool head = begin < plan_.head;
       std::size_t lanes = std::min(head ? plan_.head - begin : most, end - begin);
       const bool whole = lanes >= kWidest && !head;

@@ -13,6 +13,7 @@
 
 #include "calls.h"
 #include "facetwise/client.h"
+#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "health.h"
 #include "server_process.h"
@@ -39,6 +40,12 @@ class Lifetime : public ::testing::Test {
     grpc::ClientContext context;
     v1::BatchResponse response;
     return stub.Run(&context, good_request(lanes), &response);
+  }
+
+  static grpc::Status run_request(v1::Sampler::Stub& stub, const v1::BatchRequest& request) {
+    grpc::ClientContext context;
+    v1::BatchResponse response;
+    return stub.Run(&context, request, &response);
   }
 
   testing::TemporaryFolder folder_;
@@ -100,6 +107,13 @@ TEST_F(Lifetime, AddressesThatCannotBeListenedOnAreRefused) {
   expect_refused({"--listen", "unix:"}, "has no path");
   expect_refused({"--listen", "8000"}, "is neither unix:PATH nor HOST:PORT");
   expect_refused({"--listen", "127.0.0.1:99999"}, "is neither unix:PATH nor HOST:PORT");
+  for (const char* strange :
+       {"unix-abstract:1234", "dns:///localhost:1", "ipv4:127.0.0.1:1", "vsock:1", "a b:1", "[::1:5", "::1:5"})
+    expect_refused({"--listen", strange}, "is neither unix:PATH nor HOST:PORT");
+  for (const char* open : {"0.0.0.0:0", "[::]:0", "192.0.2.1:0", "example.org:0"})
+    expect_refused({"--listen", open}, "is open to the network");
+  ServerProcess everywhere({"--listen", "0.0.0.0:0", "--insecure"});
+  EXPECT_TRUE(everywhere.ready()) << "said aloud";
   ServerProcess server({"--listen", "127.0.0.1:0"});
   ASSERT_TRUE(server.ready());
   expect_refused({"--listen", server.addresses()[0]}, server.addresses()[0] + ": cannot listen there");
@@ -144,12 +158,103 @@ TEST_F(Lifetime, CallsAboveTheLimitAreRefused) {
 
 TEST_F(Lifetime, BytesAboveTheLimitAreRefused) {
   ServerProcess server(
-      {"--listen", unix_address(), "--max-message-bytes", "1000000", "--max-bytes-in-flight", "1000000"});
+      {"--listen", unix_address(), "--max-message-bytes", "1000000", "--max-bytes-in-flight", "3000000"});
+  ASSERT_TRUE(server.ready());
+  std::atomic<int> refused = 0, answered = 0;
+  std::vector<std::thread> callers;
+  for (int k = 0; k < 8; ++k)
+    callers.emplace_back([&] {
+      const auto stub = stub_of(unix_address());
+      for (int call = 0; call < 100; ++call) {
+        const grpc::Status status = run(*stub, 20000);
+        answered += status.ok();
+        if (status.ok()) continue;
+        EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+        EXPECT_NE(status.error_message().find("bytes of messages"), std::string::npos) << status.error_message();
+        ++refused;
+      }
+    });
+  for (std::thread& caller : callers) caller.join();
+  EXPECT_GT(refused, 0);
+  EXPECT_GT(answered, 0);
   const auto stub = stub_of(unix_address());
-  const grpc::Status refused = run(*stub, 20000);
-  EXPECT_EQ(refused.error_code(), StatusCode::RESOURCE_EXHAUSTED);
-  EXPECT_NE(refused.error_message().find("bytes of messages"), std::string::npos) << refused.error_message();
-  for (int k = 0; k < 100; ++k) ASSERT_TRUE(run(*stub, 5000).ok());  // what was held is given back
+  for (int k = 0; k < 100; ++k) ASSERT_TRUE(run(*stub, 20000).ok());  // what was held is given back
+}
+
+// A limit under which no call could ever be answered is an error of the start, not of every call.
+TEST_F(Lifetime, LimitsThatAnswerNothingAreRefused) {
+  ServerProcess server(
+      {"--listen", unix_address(), "--max-message-bytes", "1000000", "--max-bytes-in-flight", "2999999"});
+  EXPECT_FALSE(server.ready());
+  EXPECT_EQ(server.wait(), 1);
+  EXPECT_NE(server.errors().find("max_bytes_in_flight: below three times"), std::string::npos) << server.errors();
+}
+
+TEST_F(Lifetime, CallsThatSendNothingAreEnded) {
+  ServerProcess server({"--listen", unix_address(), "--max-calls", "4", "--read-ms", "300", "--idle-ms", "600"});
+  ASSERT_TRUE(server.ready());
+  // Headers and no message, as many as there may be calls.
+  const auto channel = open_channel(unix_address());
+  grpc::GenericStub generic(channel);
+  grpc::CompletionQueue queue;
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::unique_ptr<grpc::GenericClientAsyncReaderWriter>> calls;
+  for (const char* method : {"Run", "Compact", "RunStream", "CompactStream"}) {
+    contexts.push_back(std::make_unique<grpc::ClientContext>());
+    calls.push_back(generic.PrepareCall(contexts.back().get(), std::string("/facetwise.v1.Sampler/") + method, &queue));
+    calls.back()->StartCall(calls.back().get());
+    void* tag = nullptr;
+    bool good = false;
+    ASSERT_TRUE(queue.Next(&tag, &good) && good);
+  }
+  const auto stub = stub_of(unix_address());
+  const auto begun = Clock::now();
+  while (run(*stub, 3).ok() && Clock::now() - begun < std::chrono::seconds(10)) usleep(1000);  // until all four are in
+  grpc::Status status = run(*stub, 3);
+  EXPECT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED);
+  while (!(status = run(*stub, 3)).ok()) {
+    ASSERT_EQ(status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+    usleep(10000);
+  }
+  for (auto& context : contexts) context->TryCancel();
+  for (auto& call : calls) {
+    grpc::Status ended;
+    call->Finish(&ended, call.get());
+    void* tag = nullptr;
+    bool good = false;
+    ASSERT_TRUE(queue.Next(&tag, &good));
+    EXPECT_EQ(ended.error_code(), StatusCode::CANCELLED);
+  }
+}
+
+// A deadline ends the work too: the server's thread is free again long before the call would have been done.
+TEST_F(Lifetime, DeadlinesStopTheWork) {
+  ServerProcess server({"--listen", unix_address(), "--threads", "1", "--max-message-bytes", "1000000000",
+                        "--max-bytes-in-flight", "4000000000"});
+  ASSERT_TRUE(server.ready());
+  const auto stub = stub_of(unix_address());
+  // One value for all columns: a small request for seconds of work.
+  v1::BatchRequest slow = good_request(1);
+  slow.mutable_model()->set_distribution(v1::BECKMANN);
+  slow.set_sampler(v1::VISIBLE);
+  slow.set_lanes(200000000);
+  slow.clear_outputs();
+  slow.add_outputs(v1::STATUS);
+  const auto begun = Clock::now();
+  {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(300));
+    v1::BatchResponse response;
+    EXPECT_EQ(stub->Run(&context, slow, &response).error_code(), StatusCode::DEADLINE_EXCEEDED);
+  }
+  // The only thread answers again.
+  EXPECT_TRUE(run(*stub, 3).ok());
+  const auto stopped = Clock::now() - begun;
+  // How long it is without a deadline, by a twentieth of it.
+  slow.set_lanes(10000000);
+  const auto again = Clock::now();
+  EXPECT_TRUE(run_request(*stub, slow).ok());
+  EXPECT_LT(stopped, std::chrono::milliseconds(300) + 10 * (Clock::now() - again));
 }
 
 TEST_F(Lifetime, OutlivesClientsThatGoAway) {

@@ -6,6 +6,7 @@
 #include "calls.h"
 #include "facetwise/engine.h"
 #include "grpcpp/generic/generic_stub.h"
+#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "server_process.h"
 
@@ -184,22 +185,55 @@ TEST_F(MalformedCall, Generator) {
 TEST_F(MalformedCall, TooMuch) {
   const auto exhausted = StatusCode::RESOURCE_EXHAUSTED;
   for (const std::uint64_t lanes : {std::uint64_t{kMessageBytes / 4 + 1}, std::uint64_t{1} << 40, ~std::uint64_t{0}})
-    expect_run_error(
-        "lanes: ", [&](auto& r) { r.set_lanes(lanes); }, exhausted);
+    expect_run_error("lanes: ", [&](auto& r) { r.set_lanes(lanes); });
   // A small request for a large answer.
-  expect_run_error(
-      "outputs: ",
-      [](v1::BatchRequest& r) {
-        r = good_request(1);
-        r.set_lanes(100000);
-      },
-      exhausted);
+  expect_run_error("outputs: ", [](v1::BatchRequest& r) {
+    r = good_request(1);
+    r.set_lanes(100000);
+  });
   v1::BatchRequest large = good_request(kMessageBytes / 8 / 4);
   large.set_u3(floats(1, 0.5f));
   large.clear_outputs();
   EXPECT_TRUE(run(large).ok());
   large.set_u1(floats(kMessageBytes / 4 + 100, 0.5f));
-  expect_error(run(large), exhausted, "");
+  expect_error(run(large), exhausted, "");  // gRPC's own refusal
+}
+
+// A few hundred kilobytes that would be hundreds of megabytes.
+TEST_F(MalformedCall, CompressedMessagesAreRefused) {
+  for (const auto algorithm : {GRPC_COMPRESS_GZIP, GRPC_COMPRESS_DEFLATE}) {
+    grpc::ClientContext context;
+    context.set_compression_algorithm(algorithm);
+    v1::BatchResponse response;
+    v1::BatchRequest request = good_request(3);
+    request.mutable_model()->set_slope_table(std::string(std::size_t{200} << 20, 'x'));
+    const grpc::Status status = stub_->Run(&context, request, &response);
+    expect_error(status, StatusCode::UNIMPLEMENTED, "");
+  }
+  expect_alive();
+}
+
+TEST_F(MalformedCall, MoreMessagesThanACallTakes) {
+  grpc::GenericStub generic(channel_);
+  grpc::ClientContext context;
+  grpc::CompletionQueue queue;
+  const auto call = generic.PrepareCall(&context, "/facetwise.v1.Sampler/Run", &queue);
+  const auto step = [&](auto&& start) {
+    start();
+    void* tag = nullptr;
+    bool good = false;
+    return queue.Next(&tag, &good) && good;
+  };
+  const std::string bytes = good_request(3).SerializeAsString();
+  const grpc::Slice slice(bytes);
+  const grpc::ByteBuffer message(&slice, 1);
+  ASSERT_TRUE(step([&] { call->StartCall(nullptr); }));
+  ASSERT_TRUE(step([&] { call->Write(message, nullptr); }));
+  step([&] { call->Write(message, nullptr); });
+  step([&] { call->WritesDone(nullptr); });
+  grpc::Status status;
+  ASSERT_TRUE(step([&] { call->Finish(&status, nullptr); }));
+  expect_error(status, StatusCode::INVALID_ARGUMENT, "message: more than one");
 }
 
 TEST_F(MalformedCall, Compact) {
@@ -213,17 +247,17 @@ TEST_F(MalformedCall, Compact) {
     change(request);
     expect_error(compact(request), code, message);
   };
-  const auto invalid = StatusCode::INVALID_ARGUMENT, exhausted = StatusCode::RESOURCE_EXHAUSTED;
+  const auto invalid = StatusCode::INVALID_ARGUMENT;
   expect(invalid, "status: missing", [](auto& r) { r.clear_status(); });
   expect(invalid, "status: 2 values for 3 lanes", [](auto& r) { r.set_status("ab"); });
   expect(invalid, "columns[1]: 2 values for 3 lanes", [](auto& r) { r.add_columns(floats(2, 1)); });
   expect(invalid, "columns[1]: 0 values for 3 lanes", [](auto& r) { r.add_columns(""); });
   expect(invalid, "columns[1]: 7 bytes", [](auto& r) { r.add_columns("1234567"); });
-  expect(exhausted, "lanes: ", [](auto& r) { r.set_lanes(~0ull); });
-  expect(exhausted, "columns: more than the limit of 64", [](auto& r) {
+  expect(invalid, "lanes: ", [](auto& r) { r.set_lanes(~0ull); });
+  expect(invalid, "columns: more than the limit of 64", [](auto& r) {
     for (int k = 0; k < 64; ++k) r.add_columns(floats(1, 1));
   });
-  expect(exhausted, "columns: ", [](auto& r) {
+  expect(invalid, "columns: ", [](auto& r) {
     r.set_lanes(kMessageBytes / 8);
     r.set_status(std::string(1, 0));
     r.clear_columns();

@@ -36,9 +36,15 @@ int main(int argc, char** argv) {
   app.add_option("--max-calls", options.max_calls);
   app.add_option("--max-bytes-in-flight", options.max_bytes_in_flight);
   app.add_option("--drain-ms", drain_ms);
+  long read_ms = 20000, idle_ms = 300000;
+  app.add_option("--read-ms", read_ms);
+  app.add_option("--idle-ms", idle_ms);
+  app.add_flag("--insecure", options.insecure);
   app.add_flag("--allow-benchmark", options.allow_benchmark);
   CLI11_PARSE(app, argc, argv);
   options.drain_timeout = std::chrono::milliseconds(drain_ms);
+  options.read_timeout = std::chrono::milliseconds(read_ms);
+  options.stream_idle_timeout = std::chrono::milliseconds(idle_ms);
   options.benchmark = report_steps;
   const absl::Status status = facetwise::serve(options, [](const facetwise::Server& server) {
     for (const std::string& address : server.addresses()) std::printf("%s\n", address.c_str());

@@ -19,7 +19,7 @@ std::string_view version();
 
 // Runs one operation on a batch (see Operation for what it reads and writes). Errors are InvalidArgument
 // and name the field; then nothing was written. Bad lanes are no error: they get a status.
-// Execution::target not available here is FailedPrecondition.
+// Execution::target not available here is FailedPrecondition; a call that Execution::stop ends is Cancelled.
 absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Execution& execution = {});
 
 inline absl::StatusOr<Statistics> sample_normal(const Batch& batch, const Execution& execution = {}) {

@@ -1,6 +1,7 @@
 // Which instruction set the kernels run on, and on how many threads.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -53,6 +54,9 @@ struct Execution {
   bool one_lane = false;
   Threads threads = Threads::automatic;
   Stores stores = Stores::automatic;
+  // If given, it is looked at between tiles (some thousand lanes): once it is true the call ends with Cancelled, some of
+  // its outputs written. It outlives the call. compact() is short and does not look.
+  const std::atomic<bool>* stop = nullptr;
 };
 
 }  // namespace facetwise

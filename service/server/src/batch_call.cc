@@ -340,13 +340,19 @@ absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const C
 
   const Response response(decoder.outputs(), decoder.lanes());
   if (response.bytes() > tools.limits.message_bytes)
-    return absl::ResourceExhaustedError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
-                                                     " lanes are above the limit of ", tools.limits.message_bytes,
-                                                     ": send fewer lanes"));
+    return absl::InvalidArgumentError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
+                                                   " lanes are above the limit of ", tools.limits.message_bytes,
+                                                   ": send fewer lanes"));
   if (auto status = tools.ticket.hold(response.bytes()); !status.ok()) return status;
   wire::MessageWriter writer = response.make(batch);
-  const auto statistics = tools.compute.run(
-      tools.admission.calls(), [&](const Execution& execution) { return run(decoder.operation(), batch, execution); });
+  // Shorter calls are done before anybody could stop them.
+  constexpr std::size_t kLong = std::size_t{1} << 18;
+  std::optional<Watch::Computing> computing;
+  if (batch.lanes >= kLong) computing.emplace(tools.watch, tools.context);
+  const auto statistics = tools.compute.run(tools.admission.calls(), [&](Execution execution) {
+    if (computing) execution.stop = &computing->stop();
+    return run(decoder.operation(), batch, execution);
+  });
   if (!statistics.ok()) return statistics.status();
 
   v1::Statistics counts;
@@ -366,7 +372,7 @@ absl::Status damaged_message() { return absl::InvalidArgumentError("message: tru
 
 absl::Status check_lanes(std::uint64_t lanes, const Limits& limits) {
   if (lanes <= limits.lanes()) return absl::OkStatus();
-  return absl::ResourceExhaustedError(
+  return absl::InvalidArgumentError(
       absl::StrCat("lanes: ", lanes, " are above the limit of ", limits.lanes(), ": send them in several calls"));
 }
 

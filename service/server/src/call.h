@@ -9,6 +9,7 @@
 #include "grpcpp/support/byte_buffer.h"
 #include "src/admission.h"
 #include "src/compute.h"
+#include "src/watch.h"
 
 namespace facetwise {
 
@@ -26,6 +27,8 @@ struct CallTools {
   Compute& compute;
   Admission& admission;
   Admission::Ticket& ticket;
+  Watch& watch;
+  grpc::ServerContext& context;
 };
 
 // Both empty `request` once it is read. Errors begin with the field's name.

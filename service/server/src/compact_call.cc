@@ -59,7 +59,7 @@ class Decoder {
         const std::size_t k = decoded.columns.size();
         if (!reader_.length(field, bytes)) return damaged_message();
         if (k == kMostCompactColumns)
-          return absl::ResourceExhaustedError(absl::StrCat("columns: more than the limit of ", kMostCompactColumns));
+          return absl::InvalidArgumentError(absl::StrCat("columns: more than the limit of ", kMostCompactColumns));
         if (bytes % 4 != 0)
           return invalid_field(absl::StrCat("columns[", k, "]"),
                                absl::StrCat(bytes, " bytes are not whole values of 4 bytes"));
@@ -95,9 +95,9 @@ absl::Status check_request(const Decoded& decoded, const Limits& limits) {
                            absl::StrCat(column.count(), " values for ", lanes, lanes == 1 ? " lane" : " lanes"));
   }
   if (const std::size_t most = lanes * 4 * (1 + decoded.columns.size()); most > limits.message_bytes)
-    return absl::ResourceExhaustedError(absl::StrCat("columns: ", most, " bytes for ", lanes,
-                                                     " lanes are above the limit of ", limits.message_bytes,
-                                                     ": send fewer lanes"));
+    return absl::InvalidArgumentError(absl::StrCat("columns: ", most, " bytes for ", lanes,
+                                                   " lanes are above the limit of ", limits.message_bytes,
+                                                   ": send fewer lanes"));
   return absl::OkStatus();
 }
 

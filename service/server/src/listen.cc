@@ -6,8 +6,11 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <iterator>
+#include <string_view>
 #include <utility>
 
 #include "absl/strings/numbers.h"
@@ -30,7 +33,7 @@ std::string unix_path(const std::string& address) {
   return address.starts_with(kUnix) ? address.substr(std::strlen(kUnix)) : "";
 }
 
-absl::Status check_address(const std::string& address) {
+absl::Status check_address(const std::string& address, bool insecure) {
   const auto invalid = [&](absl::string_view what) {
     return absl::InvalidArgumentError(absl::StrCat("listen: \"", address, "\" ", what));
   };
@@ -46,6 +49,24 @@ absl::Status check_address(const std::string& address) {
   if (colon == std::string::npos || colon == 0 || !absl::SimpleAtoi(address.substr(colon + 1), &port) || port < 0 ||
       port > 65535)
     return invalid("is neither unix:PATH nor HOST:PORT");
+  const std::string host = address.substr(0, colon);
+  const bool bracketed = host.starts_with('[') && host.ends_with(']');
+  const std::string_view inside =
+      bracketed ? std::string_view(host).substr(1, host.size() - 2) : std::string_view(host);
+  const char* letters =
+      bracketed ? "0123456789abcdefABCDEF:." : "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ-.";
+  // gRPC reads "unix-abstract:1" and the like as something else than a host.
+  static constexpr std::string_view kSchemes[] = {"unix-abstract", "dns", "ipv4",       "ipv6",
+                                                  "vsock",         "xds", "passthrough"};
+  if (inside.empty() || inside.find_first_not_of(letters) != std::string_view::npos ||
+      std::find(std::begin(kSchemes), std::end(kSchemes), inside) != std::end(kSchemes))
+    return invalid("is neither unix:PATH nor HOST:PORT");
+  const bool loopback = host.starts_with("127.") || host == "localhost" || host == "[::1]";
+  if (!loopback && !insecure)
+    return invalid(
+        "is open to the network, without encryption or authentication: say so (--insecure), or listen on 127.0.0.1 or "
+        "a "
+        "Unix socket");
   return absl::OkStatus();
 }
 

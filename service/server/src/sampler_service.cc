@@ -55,9 +55,16 @@ void SamplerService::add(const char* name, Answer answer, Messages messages) {
 grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& context, Stream& stream) {
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
-  grpc::ByteBuffer request;
-  if (!stream.Read(&request) || context.IsCancelled()) return grpc::Status::CANCELLED;
-  auto answered = answer(request, {limits_, compute_, admission_, ticket});
+  grpc::ByteBuffer request, another;
+  {
+    const Watch::Reading reading(watch_, context, options_.read_timeout);
+    if (!stream.Read(&request) || context.IsCancelled()) return grpc::Status::CANCELLED;
+    // A call of one message ends its side with it.
+    if (stream.Read(&another))
+      return error(grpc::StatusCode::INVALID_ARGUMENT, "message: more than one, in a call that takes one");
+    if (context.IsCancelled()) return grpc::Status::CANCELLED;
+  }
+  auto answered = answer(request, {limits_, compute_, admission_, ticket, watch_, context});
   if (!answered.ok()) return to_grpc(answered.status());
   stream.WriteLast(*answered, {});
   return grpc::Status::OK;
@@ -66,15 +73,18 @@ grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& cont
 grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& context, Stream& stream) {
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
-  for (grpc::ByteBuffer request; stream.Read(&request);) {
+  for (grpc::ByteBuffer request;;) {
+    {
+      const Watch::Reading reading(watch_, context, options_.stream_idle_timeout);
+      if (!stream.Read(&request)) return context.IsCancelled() ? grpc::Status::CANCELLED : grpc::Status::OK;
+    }
     if (context.IsCancelled()) return grpc::Status::CANCELLED;
-    auto answered = answer(request, {limits_, compute_, admission_, ticket});
+    auto answered = answer(request, {limits_, compute_, admission_, ticket, watch_, context});
     if (!answered.ok()) return to_grpc(answered.status());
     if (!stream.Write(*answered)) return grpc::Status::CANCELLED;  // the client has gone
     ticket.release();
     if (admission_.closed()) return error(grpc::StatusCode::UNAVAILABLE, "the server is shutting down");
   }
-  return grpc::Status::OK;
 }
 
 grpc::Status SamplerService::info(v1::InfoResponse& response) {

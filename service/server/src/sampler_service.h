@@ -14,6 +14,7 @@
 #include "src/admission.h"
 #include "src/call.h"
 #include "src/compute.h"
+#include "src/watch.h"
 
 namespace facetwise {
 
@@ -44,6 +45,7 @@ class SamplerService final : public grpc::Service {
   const Limits limits_;
   Admission admission_;
   Compute compute_;
+  Watch watch_;
   std::atomic<bool> benchmark_runs_{false};
 };
 

@@ -1,6 +1,7 @@
 // A server process: from start to the signal that ends it.
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -58,6 +59,11 @@ class Signals {
 
 absl::Status serve(const ServerOptions& options, const std::function<void(const Server&)>& ready) {
   tune_malloc();
+  // As many connections as the system allows: at the limit gRPC's listener stops for good.
+  if (rlimit files; getrlimit(RLIMIT_NOFILE, &files) == 0 && files.rlim_cur < files.rlim_max) {
+    files.rlim_cur = files.rlim_max;
+    setrlimit(RLIMIT_NOFILE, &files);
+  }
   Signals signals;
   if (auto status = signals.install(); !status.ok()) return status;
   auto server = Server::start(options);

@@ -27,14 +27,15 @@ absl::Status check_options(const ServerOptions& options) {
   const auto invalid = [](absl::string_view what) { return absl::InvalidArgumentError(what); };
   if (options.listen.empty()) return invalid("listen: no address given: unix:PATH or HOST:PORT");
   for (const std::string& address : options.listen)
-    if (auto status = check_address(address); !status.ok()) return status;
+    if (auto status = check_address(address, options.insecure); !status.ok()) return status;
   if (options.unix_mode > 0777) return invalid("unix_mode: not permissions");
   if (options.threads < 0) return invalid("threads: below 0");
   if (options.max_message_bytes < 4096 || options.max_message_bytes > std::size_t{1} << 30)
     return invalid("max_message_bytes: not from 4 KiB to 1 GiB");
   if (options.max_calls < 1) return invalid("max_calls: below 1");
-  if (options.max_bytes_in_flight < options.max_message_bytes)
-    return invalid("max_bytes_in_flight: below max_message_bytes");
+  if (options.max_bytes_in_flight / 3 < options.max_message_bytes)
+    return invalid(
+        "max_bytes_in_flight: below three times max_message_bytes, what one call may hold: it could never be answered");
   if (!resolve(options.execution.target))
     return absl::FailedPreconditionError(
         absl::StrCat("target: this CPU or build has no ", std::string(name(options.execution.target))));
@@ -72,6 +73,14 @@ absl::Status GrpcServer::listen() {
   grpc::ServerBuilder builder;
   builder.RegisterService(&service_);
   builder.SetMaxReceiveMessageSize(static_cast<int>(options_.max_message_bytes));
+  // A compressed message may be a thousand times as large as what was sent.
+  for (const auto algorithm : {GRPC_COMPRESS_DEFLATE, GRPC_COMPRESS_GZIP})
+    builder.SetCompressionAlgorithmSupportStatus(algorithm, false);
+  // Connections that were cut off are found; clients may ping as often as ours do.
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
   builder.SetMaxSendMessageSize(-1);  // answer_batch() keeps responses below the limit
   // Two servers on one port would share its connections without a word.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);

@@ -26,8 +26,11 @@ using BenchmarkReport = std::function<bool(const v1::BenchmarkProgress&)>;
 using BenchmarkRunner = std::function<absl::Status(const v1::BenchmarkRequest&, const BenchmarkReport&)>;
 
 struct ServerOptions {
-  // Where to listen: "unix:PATH" or "HOST:PORT", one or more. Port 0 takes a free one: see addresses().
+  // Where to listen: "unix:PATH" or "HOST:PORT", one or more. Port 0 takes a free one: see addresses(). There is no
+  // encryption and no authentication: hosts other than this machine's loopback (127.*, localhost, [::1]) are refused
+  // unless `insecure`.
   std::vector<std::string> listen;
+  bool insecure = false;
   // Permissions of Unix sockets. Who may write to the socket may call.
   unsigned unix_mode = 0600;
   // Threads that compute; 0: as many as the machine has.
@@ -37,8 +40,11 @@ struct ServerOptions {
   std::size_t max_message_bytes = std::size_t{16} << 20;
   // Calls (and streams) at once; one more gets RESOURCE_EXHAUSTED.
   int max_calls = 128;
-  // Bytes of requests and responses held at once; a call that would go above gets RESOURCE_EXHAUSTED.
+  // Bytes of requests (twice: as received, and as decoded) and responses held at once; a call that would go above gets
+  // RESOURCE_EXHAUSTED. Three times max_message_bytes at least.
   std::size_t max_bytes_in_flight = std::size_t{1} << 30;
+  // How long a call may take to send its message, and a stream may leave between messages, before it is cancelled.
+  std::chrono::milliseconds read_timeout{20000}, stream_idle_timeout{300000};
   // How long drain() waits for calls in flight before it ends them.
   std::chrono::milliseconds drain_timeout{10000};
   // Which kernels run. Its thread setting is not used.
