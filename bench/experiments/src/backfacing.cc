@@ -220,7 +220,10 @@ absl::StatusOr<Page> backfacing_page(const Options& options) {
                             .normalisation = older ? Normalisation::biased : Normalisation::unbiased};
           material.sampler = visible ? Sampler::visible : Sampler::ndf;
         }
-        auto picture = render_here(*scene, settings, steps);
+        // Weights by all normals spread far: more samples.
+        render::Settings enough = settings;
+        if (!visible) enough.samples *= 8;
+        auto picture = render_here(*scene, enough, steps);
         if (!picture.ok()) return picture.status();
         found[older][visible] = *std::move(picture);
         double count = 0;
@@ -248,10 +251,11 @@ absl::StatusOr<Page> backfacing_page(const Options& options) {
                       settings.height,
                       {}};
     const std::string samples = fmt::format("{} samples a pixel", settings.samples);
+    const std::string more = fmt::format("{} samples a pixel", 8 * settings.samples);
     pictures.pictures.push_back(shown(found[true][true], "older normalisation", samples, 1));
-    pictures.pictures.push_back(shown(found[true][false], "older, by all normals", samples, 1));
+    pictures.pictures.push_back(shown(found[true][false], "older, by all normals", more, 1));
     pictures.pictures.push_back(shown(found[false][true], "unbiased normalisation", samples, 1));
-    pictures.pictures.push_back(shown(found[false][false], "unbiased, by all normals", samples, 1));
+    pictures.pictures.push_back(shown(found[false][false], "unbiased, by all normals", more, 1));
     pictures.pictures.push_back(difference(found[true][true], found[true][false], "error of the older",
                                            "By visible normals and by all, twice", 2));
     pictures.pictures.push_back(difference(found[false][true], found[false][false], "error of the unbiased",
