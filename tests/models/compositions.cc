@@ -102,6 +102,10 @@ std::vector<Composition> compositions(const Family& family, Operation operation)
           for (const bool retro : {false, true}) {
             if (scatters(operation) && interface != Interface::dielectric) continue;
             if (!reads_interface(operation) && interface != Interface::conductor) continue;
+            // An emulator tries each choice, not each combination: its bits are compared with those of all anyway.
+            if (kQuick && ((shadowing == Shadowing::uncorrelated) != (normalisation == Normalisation::biased) ||
+                           (interface == Interface::schlick) != retro))
+              continue;
             Composition c = plain(family, sampler);
             c.model.shadowing = shadowing;
             c.model.normalisation = normalisation;

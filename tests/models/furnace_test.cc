@@ -26,7 +26,7 @@ TEST_P(ModelFurnace, MeanWeightIsTheAlbedo) {
       c.model.shadowing = shadowing;
       c.model.interface = interface;
       std::vector<Point> points = calm_points(c);
-      if (kQuick) points.resize(2);
+      if (kQuick) points.resize(1);
       for (std::size_t n = 0; n < points.size(); ++n) {
         if (interface != Interface::conductor && n % 2 == 0) continue;
         const double albedo = reference::albedo(surface_of(c, points[n]), incident(points[n]));
@@ -90,7 +90,7 @@ TEST_P(ModelFurnace, WeightsOfVisibleNormalsAreAtMostOne) {
     if (c.sampler != Sampler::visible && c.sampler != Sampler::heitz && c.sampler != Sampler::cap) continue;
     // Biased: more than all is reflected where the area of |i_z| is the smaller.
     if (c.model.normalisation == Normalisation::biased) continue;
-    const std::vector<Point> points = hard_points(c, kQuick ? 512 : 4096, ++seed, true);
+    const std::vector<Point> points = hard_points(c, kQuick ? 128 : 4096, ++seed, true);
     const std::vector<Result> results = run_points(Operation::sample_reflection, c, points);
     for (std::size_t n = 0; n < points.size(); ++n)
       ASSERT_LE(results[n].weight, 1 + 1e-4) << describe(c) << describe(points[n]);
@@ -105,7 +105,7 @@ TEST_P(ModelFurnace, ReflectionIsReciprocal) {
   double worst = 0;
   for (const Composition& c : compositions(GetParam(), Operation::evaluate_reflection)) {
     if (c.sampler != Sampler::visible) continue;
-    std::vector<Point> points = hard_points(c, kQuick ? 256 : 4096, ++seed), back;
+    std::vector<Point> points = hard_points(c, kQuick ? 128 : 4096, ++seed), back;
     std::erase_if(points, [](const Point& p) { return p.iz < 0.02f || p.oz < 0.02f; });
     for (const Point& p : points) {
       Point other = p;

@@ -107,7 +107,7 @@ TEST_P(ModelScattering, WeightsOfVisibleNormalsAreAtMostOne) {
   for (Composition c : compositions(GetParam(), Operation::sample_scattering)) {
     if (c.sampler == Sampler::ndf || c.model.normalisation == Normalisation::biased) continue;
     c.model.transport = Transport::importance;
-    const std::vector<Point> points = hard_points(c, kQuick ? 512 : 4096, ++seed, true);
+    const std::vector<Point> points = hard_points(c, kQuick ? 128 : 4096, ++seed, true);
     const std::vector<Result> results = run_points(Operation::sample_scattering, c, points);
     for (std::size_t n = 0; n < points.size(); ++n)
       ASSERT_LE(results[n].weight, 1 + 1e-4) << describe(c) << describe(points[n]);
@@ -231,7 +231,7 @@ TEST_P(ModelScattering, SamplesAgreeWithQueries) {
     c.model.transport = ++seed % 2 ? Transport::radiance : Transport::importance;
     std::vector<Point> points;
     for (const Point& calm : glasses(c))
-      for (const Point& p : with_random(calm, kQuick ? 16 : 256, seed * 10 + points.size())) points.push_back(p);
+      for (const Point& p : with_random(calm, kQuick ? 8 : 256, seed * 10 + points.size())) points.push_back(p);
     const std::vector<Result> samples = run_points(Operation::sample_scattering, c, points);
     for (std::size_t n = 0; n < points.size(); ++n) {
       points[n].ox = samples[n].ox;
@@ -286,7 +286,7 @@ TEST_P(ModelScattering, TransportsDifferByEtaSquared) {
   for (const Sampler sampler : samplers()) {
     const Composition radiance = glass(GetParam(), sampler),
                       importance = glass(GetParam(), sampler, Transport::importance);
-    const std::vector<Point> points = scattering_points(radiance, kQuick ? 512 : 8192, 31);
+    const std::vector<Point> points = scattering_points(radiance, kQuick ? 128 : 8192, 31);
     for (const Operation operation : {Operation::sample_scattering, Operation::sample_transmission,
                                       Operation::evaluate_scattering, Operation::evaluate_transmission}) {
       const std::vector<Result> a = run_points(operation, radiance, points),
@@ -388,7 +388,7 @@ TEST_P(ModelScattering, RetroTurnsReflectionsAlone) {
   for (const Sampler sampler : samplers()) {
     Composition c = glass(GetParam(), sampler), retro = c;
     retro.model.retro = true;
-    std::vector<Point> points = scattering_points(retro, kQuick ? 512 : 8192, 77);
+    std::vector<Point> points = scattering_points(retro, kQuick ? 128 : 8192, 77);
     for (Point& p : points) p.mean_x = p.mean_y = 0;
     const std::vector<Result> a = run_points(Operation::sample_scattering, c, points),
                               b = run_points(Operation::sample_scattering, retro, points);

@@ -194,7 +194,7 @@ absl::StatusOr<Page> backfacing_page(const Options& options) {
   auto scene = lit("normal-map");
   if (!scene.ok()) return scene.status();
   render::Settings settings;
-  settings.width = by_size(options, 128, 384, 1024);
+  settings.width = by_size(options, 128, 256, 1024);
   settings.height = settings.width / 2;
   settings.samples = by_size(options, 64u, 256u, 2048u);
   settings.numbers = render::Numbers::sobol;
