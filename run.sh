@@ -82,7 +82,7 @@ rm -f out/verify.json out/report.json
 logged verify "$facetwise" verify --remote "$address" --json out/verify.json
 say "benchmark: a minute and a half (out/bench.log)"
 logged bench "$facetwise" bench --quick --remote "$address" --json out/report.json
-say "experiments: two minutes (out/experiments.log)"
+say "experiments: three minutes (out/experiments.log)"
 rm -rf out/experiments
 logged experiments "$facetwise" experiment --quick --folder out/experiments
 logged report "$facetwise" report --bench out/report.json --verification out/verify.json --folder out/experiments \
@@ -93,4 +93,4 @@ echo
 "$facetwise" summary --report out/report.json --verification out/verify.json
 echo
 echo "Look at it: out/report.html. Results: out/report.json, out/verify.json. Full tables: out/bench.log."
-echo "The experiments' claims, measured: out/experiments.log; in full: facetwise experiment (most of an hour)."
+echo "The experiments' claims, measured: out/experiments.log; in full: facetwise experiment (about half an hour)."

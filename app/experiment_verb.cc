@@ -93,7 +93,7 @@ Examples:
       ->option_text("NAME...");
   command.add_option("--folder", arguments->folder, "Where the pages go; default out/experiments")
       ->option_text("FOLDER");
-  auto* quick = command.add_flag("--quick", arguments->quick, "Small pictures and few samples: about a minute");
+  auto* quick = command.add_flag("--quick", arguments->quick, "Small pictures and few samples: about three minutes");
   command.add_flag("--paper", arguments->paper, "The texts' sizes: hours")->excludes(quick);
   return {&command, [arguments] { return arguments->run(); }};
 }
