@@ -1,22 +1,19 @@
 // experiment: the texts' experiments, as JSON for the report.
 #include <fmt/format.h>
 
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 
 #include "app/arguments.h"
 #include "app/errors.h"
+#include "app/interrupt.h"
 #include "app/table/output_file.h"
 #include "app/verbs.h"
 #include "facetwise/experiments.h"
 
 namespace facetwise::app {
 namespace {
-
-std::atomic<bool> stopped = false;
 
 struct ExperimentVerb {
   std::vector<std::string> ids;
@@ -25,7 +22,7 @@ struct ExperimentVerb {
 
   int run() {
     using Size = experiments::Options::Size;
-    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopped = true; });
+    catch_interrupts();
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error) return fail("experiment", invalid("{}: {}", folder, error.message()));
@@ -51,7 +48,7 @@ struct ExperimentVerb {
         before = text.substr(7);
         fmt::print(stderr, "{}\n", text);
       }
-      return !stopped;
+      return !interrupted;
     };
     auto page = experiment.run(options);
     if (!page.ok()) return page.status();

@@ -3,14 +3,13 @@
 #include <fmt/ranges.h>
 #include <tbb/global_control.h>
 
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 
 #include "app/arguments.h"
 #include "app/errors.h"
+#include "app/interrupt.h"
 #include "app/progress.h"
 #include "app/verbs.h"
 #include "facetwise/client.h"
@@ -18,8 +17,6 @@
 
 namespace facetwise::app {
 namespace {
-
-std::atomic<bool> stopped = false;
 
 struct RenderVerb {
   std::string scene = "orbs", environment = "courtyard", output, png;
@@ -98,11 +95,11 @@ struct RenderVerb {
       if (!loaded.ok()) return loaded.status();
       before = *std::move(loaded);
     }
-    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { stopped = true; });
+    catch_interrupts();
     Progress progress("render");
     settings.progress = [&](double done) {
       progress(done);
-      return !stopped;
+      return !interrupted;
     };
     auto picture = render::render(*opened, settings, *calls, std::move(before));
     if (!picture.ok()) return picture.status();
@@ -118,7 +115,7 @@ struct RenderVerb {
     const auto& times = picture.times;
     const auto share = [&](double part) { return 100 * part / std::max(times.total, 1e-9); };
     fmt::print("{} x {}, {} samples a pixel{}; {:.2f} s: engine {:.0f} %, Embree {:.0f} %, the rest {:.0f} %\n",
-               picture.width, picture.height, picture.samples(), stopped ? " (stopped; --resume goes on)" : "",
+               picture.width, picture.height, picture.samples(), interrupted ? " (stopped; --resume goes on)" : "",
                times.total, share(times.engine), share(times.embree), share(times.rest()));
     const auto lanes = std::max<std::uint64_t>(1, picture.sampled.lanes());
     fmt::print("{} paths meet {:.3f} surfaces each; of {} scattering samples {:.3f} % occluded, {:.3f} % backfacing\n",
