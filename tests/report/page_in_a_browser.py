@@ -5,6 +5,7 @@ import base64
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 import tempfile
@@ -15,6 +16,10 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
+
+# Selenium asks for "localhost", which a bare system without /etc/hosts does not know.
+resolve = socket.getaddrinfo
+socket.getaddrinfo = lambda host, *rest, **named: resolve("127.0.0.1" if host == "localhost" else host, *rest, **named)
 
 facetwise, axe = sys.argv[1:3]
 failures = []
@@ -51,7 +56,8 @@ for arguments, named in (
 options = Options()
 options.binary_location = "/usr/bin/chromium"
 for argument in ("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
-                 "disable-background-networking", "disable-component-update", "disable-sync", "window-size=1100,1400"):
+                 "disable-background-networking", "disable-component-update", "disable-sync", "window-size=1100,1400",
+                 "remote-debugging-pipe"):
     options.add_argument("--" + argument)
 options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
 browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
