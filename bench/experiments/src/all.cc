@@ -1,7 +1,5 @@
 #include "src/all.h"
 
-#include <chrono>
-
 namespace facetwise::experiments {
 
 std::vector<Experiment> all_experiments() {

@@ -1,7 +1,6 @@
 // What the experiments share: references, errors, progress.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <string>
 #include <string_view>

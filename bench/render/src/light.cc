@@ -43,13 +43,11 @@ Light::Light(const Environment& environment) : environment_(environment) {
   columns_.resize(h * (w + 1));
   density_.resize(h * w);
   std::vector<double> row_sums(h + 1), sums(w + 1);
-  std::vector<double> weights(h);
   for (std::size_t y = 0; y < h; ++y) {
     for (std::size_t x = 0; x < w; ++x)
       sums[x + 1] = sums[x] + luminance(probe.at(static_cast<int>(x), static_cast<int>(y)));
     normalise(sums[w], sums, &columns_[y * (w + 1)]);
-    weights[y] = sums[w] * (static_cast<double>(cos_edge_[y]) - cos_edge_[y + 1]);
-    row_sums[y + 1] = row_sums[y] + weights[y];
+    row_sums[y + 1] = row_sums[y] + sums[w] * (static_cast<double>(cos_edge_[y]) - cos_edge_[y + 1]);
   }
   normalise(row_sums[h], row_sums, rows_.data());
   // From the same rounded tables that are drawn from.

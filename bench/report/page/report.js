@@ -167,7 +167,7 @@ function plot(parent, figure) {
 }
 
 // Horizontal bars: groups of one value for each name.
-function bars(parent, { title, alt, label, names, groups, marks = {} }) {
+function bars(parent, { title, alt, label, names, groups }) {
   const element = add(parent, "figure");
   add(element, "h3", {}, title);
   drawn(element, alt, (svg, width) => {
@@ -190,9 +190,6 @@ function bars(parent, { title, alt, label, names, groups, marks = {} }) {
       }
       y += gap;
     });
-    for (const [name, value] of Object.entries(marks))
-      svg.append("line").attr("x1", x(value)).attr("x2", x(value)).attr("y1", 22).attr("y2", height).attr("stroke", "var(--dim)")
-        .attr("stroke-dasharray", "3 3").append("title").text(name);
   });
   key(element, names, (svg, k) => svg.append("rect").attr("y", 1).attr("width", 22).attr("height", 10).attr("fill", color(k)));
   add(element, "figcaption", {}, alt);
