@@ -53,9 +53,10 @@ void expect_same_lane(const Call& call, const Answer& expected, std::size_t expe
   }
   EXPECT_EQ(int{expected.status[expected_lane]}, int{got.status[got_lane]})
       << call_name(call) << ": status in lane " << got_lane;
-  if (!expected.event.empty())
+  if (!expected.event.empty()) {
     EXPECT_EQ(int{expected.event[expected_lane]}, int{got.event[got_lane]})
         << call_name(call) << ": event in lane " << got_lane;
+  }
 }
 
 void expect_same(const Call& call, const Answer& expected, const Answer& got) {

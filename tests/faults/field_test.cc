@@ -18,7 +18,7 @@ template <class Body>
 void for_each_input(bool known, const Body& body) {
   for (const Call& call : plain_calls())
     for (const InputField& field : input_fields())
-      if (known ? reads(call, field) || field.name == "u3" && (field.operations & bit(call.operation))
+      if (known ? reads(call, field) || (field.name == "u3" && (field.operations & bit(call.operation)) != 0)
                 : !(field.operations & bit(call.operation)))
         body(call, field);
 }

@@ -79,9 +79,8 @@ const std::vector<Family>& families() {
   return all;
 }
 
-bool sees_behind(const Model& model) {
-  return model.masking == Masking::smith ||
-         (model.distribution != Distribution::phong && model.distribution != Distribution::table);
+bool weighs_behind(const Model& model, const Point& point) {
+  return model.masking == Masking::vcavity && model.distribution == Distribution::phong && point.iz < 0;
 }
 
 Composition plain(const Family& family, Sampler sampler) {

@@ -38,8 +38,6 @@ std::vector<Sampler> samplers_of(const Family& family, Operation operation);
 // Every shadowing, normalisation, interface and retro of a family (retro: see Points), each with every
 // sampler.
 std::vector<Composition> compositions(const Family& family, Operation operation);
-// Whether the model shows anything to an i behind the surface: V-cavity but with phong and tables, and Smith.
-bool sees_behind(const Model& model);
 // The family's conductor, unbiased.
 Composition plain(const Family& family, Sampler sampler);
 
@@ -54,6 +52,9 @@ struct Point {
 };
 inline constexpr int kPointFloats = sizeof(Point) / sizeof(float);
 std::string describe(const Point& point);
+
+// Whether the normals that `visible` draws there are not visible normals, but weighted: phong with V-cavity, behind.
+bool weighs_behind(const Model& model, const Point& point);
 
 // The outputs of a lane; those that an operation does not have stay 0.
 struct Result {

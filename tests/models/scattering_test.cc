@@ -31,7 +31,6 @@ Composition glass(const Family& family, Sampler sampler, Transport transport = T
 std::vector<Point> glasses(const Composition& c) {
   std::vector<Point> points = calm_points(c);
   for (std::size_t n = 0; n < points.size(); ++n) points[n].eta = n % 2 ? 1.5f : 1 / 1.4f;
-  std::erase_if(points, [&](const Point& p) { return p.iz <= 0 && !sees_behind(c.model); });
   return points;
 }
 
@@ -110,7 +109,9 @@ TEST_P(ModelScattering, WeightsOfVisibleNormalsAreAtMostOne) {
     const std::vector<Point> points = hard_points(c, kQuick ? 128 : 4096, ++seed, true);
     const std::vector<Result> results = run_points(Operation::sample_scattering, c, points);
     for (std::size_t n = 0; n < points.size(); ++n)
-      ASSERT_LE(results[n].weight, 1 + 1e-4) << describe(c) << describe(points[n]);
+      if (!weighs_behind(c.model, points[n])) {
+        ASSERT_LE(results[n].weight, 1 + 1e-4) << describe(c) << describe(points[n]);
+      }
   }
 }
 

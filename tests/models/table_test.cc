@@ -91,16 +91,10 @@ std::vector<Result> run_table(Operation operation, const Composition& c, std::sp
 
 class Tables : public testing::TestWithParam<Kind> {};
 
-std::vector<Point> points_of(const Composition& c) {
-  std::vector<Point> points = calm_points(c);
-  if (c.model.masking == Masking::vcavity) std::erase_if(points, [](const Point& p) { return p.iz <= 0; });
-  return points;
-}
-
 TEST_P(Tables, ValuesAreaAndMaskingAreTheReferences) {
   const Composition c = composition(GetParam(), Sampler::visible);
   double worst = 0, worst_area = 0;
-  for (const Point& calm : points_of(c)) {
+  for (const Point& calm : calm_points(c)) {
     std::vector<Point> points = with_random(calm, kQuick ? 2 : 12, 5);
     // Reflections by normals of all kinds.
     const reference::Surface s = surface(c, calm);
@@ -138,7 +132,7 @@ TEST_P(Tables, SamplesAgreeWithQueriesAndFollowTheirDensity) {
   for (const Sampler sampler : {Sampler::ndf, Sampler::visible}) {
     const Composition c = composition(GetParam(), sampler);
     std::uint64_t seed = 40;
-    for (const Point& point : points_of(c)) {
+    for (const Point& point : calm_points(c)) {
       // A sample's pdf is a query's, but for neighbours of cells' ends; its weight times that is the value.
       std::vector<Point> points = with_random(point, kQuick ? 200 : 4000, ++seed);
       const auto samples = run_table(Operation::sample_reflection, c, points);

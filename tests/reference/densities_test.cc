@@ -76,8 +76,9 @@ bool has_exact(const Surface& s) {
   return d == Distribution::student_t && s.model.masking == Masking::vcavity;
 }
 
-bool sees_nothing(const Surface& s, Vector i) {
-  return s.model.masking == Masking::vcavity && i.z <= 0 && s.model.distribution == Distribution::phong;
+// Where `visible` draws by a density with edges, which quadratures run into: Phong with V-cavity, behind.
+bool has_edges(const Surface& s, Vector i) {
+  return s.model.masking == Masking::vcavity && i.z < 0 && s.model.distribution == Distribution::phong;
 }
 
 Vector reflection(Vector i, Vector m, double im) {
@@ -107,7 +108,7 @@ TEST(Densities, VisibleNormalsIntegrateToOne) {
       const Vector i = direction(theta, 35);
       const double sum =
           over_normals(s, i, [&](Vector m, double) { return reference::pdf_normal(s, Sampler::visible, i, m); });
-      EXPECT_NEAR(sum, sees_nothing(s, i) ? 0 : 1, 1e-6) << describe(s, i);
+      EXPECT_NEAR(sum, 1, has_edges(s, i) ? 2e-4 : 1e-6) << describe(s, i);
     }
   }
 }
@@ -116,8 +117,8 @@ TEST(Densities, ReflectionsIntegrateToTheShareUnoccluded) {
   for (const Surface& s : models()) {
     for (double theta : kThetas) {
       const Vector i = direction(theta, 35);
-      if (sees_nothing(s, i)) continue;
-      EXPECT_NEAR(over_pdf(s, Sampler::visible, i), reference::share_unoccluded(s, i), 2e-6) << describe(s, i);
+      EXPECT_NEAR(over_pdf(s, Sampler::visible, i), reference::share_unoccluded(s, i), has_edges(s, i) ? 2e-4 : 2e-6)
+          << describe(s, i);
     }
   }
 }
@@ -129,7 +130,6 @@ TEST(Densities, UnoccludedReflectionsIntegrateToOne) {
     if (!has_exact(s)) continue;
     for (double theta : kThetas) {
       const Vector i = direction(theta, 35);
-      if (sees_nothing(s, i)) continue;
       EXPECT_NEAR(over_pdf(s, Sampler::exact, i), 1, 1e-5) << describe(s, i);
     }
   }
@@ -244,7 +244,6 @@ TEST(Values, ReflectionIsReciprocal) {
 
 TEST(Values, ContinuousThroughTheHorizon) {
   for (const Surface& s : models()) {
-    if (sees_nothing(s, {1, 0, 0})) continue;
     const Vector o = direction(60, 170);
     const double at = reference::evaluate_reflection(s, {1, 0, 0}, o);
     for (double z : {1e-9, -1e-9, 1e-300, -1e-300})
@@ -324,7 +323,6 @@ TEST(Transmission, DensitiesIntegrateToTheShareAccepted) {
   for (const Surface& s : glasses()) {
     for (double theta : kQuick ? std::vector<double>{70} : std::vector<double>{15, 70, 100}) {
       const Vector i = direction(theta, 35);
-      if (sees_nothing(s, i)) continue;
       for (Sampler sampler : {Sampler::ndf, Sampler::visible}) {
         const double share = over_normals(s, i, [&](Vector m, double im) {
           Vector o;
@@ -342,7 +340,6 @@ TEST(Transmission, ScatteringIntegratesToTheShareThatGoesSomewhere) {
   for (const Surface& s : glasses()) {
     for (double theta : kQuick ? std::vector<double>{70} : std::vector<double>{15, 70, 100}) {
       const Vector i = direction(theta, 35);
-      if (sees_nothing(s, i)) continue;
       const double share = over_normals(s, i, [&](Vector m, double im) {
         Vector o;
         const bool reflects = reflection(i, m, im).z > 0;

@@ -33,7 +33,7 @@ void AllFunctions(const SlopeTableView& view, std::size_t n, const test::Columns
     const Vec<D> u1 = load(to.u1), u2 = load(to.u2);
     Vec<D> x, y, density, mx, my, mz, normal_density;
     DrawVisibleSlope(d, view, ct, st, cp, sp, u1, u2, x, y, density);
-    DrawVisibleNormal(d, view, ct, st, cp, sp, u1, u2, mx, my, mz, normal_density);
+    DrawVisibleNormal(d, view, ct, st, cp, sp, u1, Set(d, 1.0f) - u1, u2, mx, my, mz, normal_density);
     StoreU(x, d, to.x + k);
     StoreU(y, d, to.y + k);
     StoreU(density, d, to.density + k);

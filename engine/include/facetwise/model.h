@@ -32,7 +32,7 @@ enum class Distribution : std::uint8_t {
 enum class Masking : std::uint8_t {
   smith = 0,    // Heitz 2014, Eq. 43: G1(i) = i_z / projected_area(i)
   vcavity = 1,  // min(2 m_z |i_z| / i.m, 1): Cook & Torrance 1982; single-sided behind, Tokuyoshi 2021, Eq. 3.
-                // Behind (i_z <= 0) with ggx, beckmann and student_t; with the others such lanes are occluded
+                // Behind (i_z < 0) phong has no exact sampler: its normals are weighted (docs/models.md)
 };
 
 // Masking-shadowing function G2 of Smith, used by evaluation and by weights. V-cavity takes the smaller of

@@ -78,7 +78,7 @@ double projected_area(const Surface& surface, Vector i);
 double masking(const Surface& surface, Vector i);
 // V-cavity G(i, m) = min(2 m_z |i_z| / i.m, 1); 0 for i.m <= 0.
 double vcavity_masking(Vector i, Vector m);
-// V-cavity: share H(i) of rays that hit, 1 for i_z >= 0. Phong and tables: a difference of areas by quadrature.
+// V-cavity: share H(i) of rays that hit, 1 for i_z >= 0. Phong: by quadrature; tables: a difference of areas.
 // Model::normalisation plays no part.
 double hit_probability(const Surface& surface, Vector i);
 // What densities of visible normals are divided by. Smith: p(m) = D (i.m)+ / normaliser, sigma(i) or, biased, that
@@ -93,7 +93,8 @@ double fresnel(const Surface& surface, double cos);
 
 // `heitz` and `cap` are `visible`. For i_z <= 0 so are `bounded` (ggx with Smith, centred and uncorrelated) and
 // `exact` (ggx, beckmann without a mean slope, ggx, beckmann and student_t with V-cavity); else these two are 0
-// for normals whose reflection is occluded. Model::retro plays no part: turn i for it.
+// for normals whose reflection is occluded. Of phong behind `visible` has a density of its own; a table's is not known
+// here. Model::retro plays no part: turn i for it.
 double pdf_normal(const Surface& surface, Sampler sampler, Vector i, Vector m);
 // Retro: of the turned i, (-i_x, -i_y, i_z).
 double pdf_reflection(const Surface& surface, Sampler sampler, Vector i, Vector o);

@@ -5,7 +5,6 @@
 #include "hwy/highway.h"
 #include "src/kernels/phong-inl.h"
 #include "src/kernels/register-inl.h"
-#include "src/kernels/vcavity_samplers-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace facetwise {
@@ -16,7 +15,7 @@ constexpr DistributionKernels MakePhong() {
   DistributionKernels kernels;
   kernels.vcavity = Registrar<Surface<Phong, VCavity, false>, D, Pairs>()
                         .template Add<SlopeNdf>(Sampler::ndf)
-                        .template Add<CavityVisible>(Sampler::visible)
+                        .template Add<PhongCavity>(Sampler::visible)
                         .kernels;
   return kernels;
 }

@@ -19,7 +19,6 @@ namespace HWY_NAMESPACE {
 struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
   static constexpr bool kShifts = true;
   static constexpr bool kLongChains = true;
-  static constexpr bool kCavityBehind = true;
 
   // w_z / sqrt(A) and sqrt(A).
   template <class D, class V = Vec<D>>

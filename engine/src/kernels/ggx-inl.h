@@ -17,7 +17,6 @@ namespace HWY_NAMESPACE {
 struct Ggx : DistributionTraits {
   static constexpr bool kWaitsForMemory = true;
   static constexpr bool kHasShareUnoccluded = true;
-  static constexpr bool kCavityBehind = true;
 
   template <class D, class I>
   static HWY_INLINE void Area(D d, I& i) {

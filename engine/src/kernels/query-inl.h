@@ -40,8 +40,7 @@ struct Query {
     const V h2 = Dot(hx, hy, hz, hx, hy, hz);
     // o = -i to float's last bits has no half vector.
     const auto above = z > zero;
-    auto reached = And(And(above, hz > zero), h2 > Set(d, 0x1p-40f));
-    if (!i.all_front) reached = AndNot(S::Masking::SeesNothing(d, i), reached);
+    const auto reached = And(And(above, hz > zero), h2 > Set(d, 0x1p-40f));
     // Lanes that no microfacet reaches compute with the half vector (0, 0, 1).
     const V mx = IfThenElseZero(reached, hx), my = IfThenElseZero(reached, hy), mz = Select(reached, hz, one);
     const V m2 = Select(reached, h2, one);
@@ -53,15 +52,7 @@ struct Query {
 
     if (tile.wanted & kWantsPdf) {
       V numerator = density, two_n;
-      if constexpr (Drawer::kOwnShift) {
-        V shift;
-        two_n = Drawer::TwoN(d, i, mx, my, mz, im, shift);
-        numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, shift));
-      } else {
-        two_n = Drawer::TwoN(d, i, mx, my, mz, im);
-      }
-      if constexpr (Distribution::kShifts && !Drawer::kShifted)
-        if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, zero));
+      SampledDensity<Drawer>(d, i, mx, my, mz, m2, im, reached, numerator, two_n);
       const V pdf = Min(numerator / (denominator * two_n), largest);
       Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
     }
@@ -74,7 +65,7 @@ struct Query {
         value = value * interface.Reflectance(d, tile, Sqrt(m2) * Set(d, 0.5f));
       Store(d, tile, kOutValue, lane, exceptions.Output(value, zero));
     }
-    exceptions.Finish(tile, lane, Or(Not(above), S::Masking::SeesNothing(d, i)), statistics);
+    exceptions.Finish(tile, lane, Not(above), statistics);
   }
 };
 

@@ -55,7 +55,6 @@ struct Sample {
 
     auto occluded = tile.normals_alone ? NoLanes(d) : oz <= zero;
     if constexpr (!Drawer::kVisible) occluded = Or(occluded, drawn.im <= Set(d, kSmallestIm));
-    if (!i.all_front) occluded = Or(occluded, S::Masking::SeesNothing(d, i));
     const auto accepted = Not(occluded);
 
     // p(o) = D(m) / (4 N)

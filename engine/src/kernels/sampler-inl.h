@@ -103,6 +103,21 @@ struct VisibleNormals : SamplerTraits {
   }
 };
 
+// Of a normal that is asked for, its density D and the sampler's 2 N, both with the same shift. `density` is D with i's.
+template <class Drawer, class D, class I, class V = Vec<D>>
+HWY_INLINE void SampledDensity(D d, const I& i, V mx, V my, V mz, V m2, V im, Mask<D> reached, V& density, V& two_n) {
+  using Distribution = typename I::Distribution;
+  if constexpr (Drawer::kOwnShift) {
+    V shift;
+    two_n = Drawer::TwoN(d, i, mx, my, mz, im, shift);
+    density = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, shift));
+  } else {
+    two_n = Drawer::TwoN(d, i, mx, my, mz, im);
+    if constexpr (Distribution::kShifts && !Drawer::kShifted)
+      if (!i.all_front) density = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, m2, Zero(d)));
+  }
+}
+
 // Where a direction (x, y, .) points in the plane: (1, 0) if it is vertical.
 template <class D>
 struct Azimuth {

@@ -77,7 +77,6 @@ struct Scatter {
     const V c = Min(Max(drawn.im, Set(d, kSmallestIm)) * inverse_length, one);
     auto seen = drawn.im > (Drawer::kVisible ? zero : Set(d, kSmallestIm));
     if constexpr (Drawer::kVisible) seen = Not(NoLanes(d));
-    if (!i.all_front) seen = AndNot(S::Masking::SeesNothing(d, i), seen);
 
     // Both events.
     V rho = (drawn.im + drawn.im) / drawn.mm;
@@ -124,7 +123,9 @@ struct Scatter {
     if (tile.wanted & kWantsWeight) {
       const V reflected_weight = S::Masking::template Weight<Drawer>(d, i, drawn, rx, ry, rz, tile.uncorrelated);
       V transmitted_weight = S::Masking::TransmissionMasking(d, i, mz, c, refraction.g * inverse_eta, tx, ty, tz);
-      if constexpr (!Drawer::kNIsSigma) {
+      if constexpr (Drawer::kOwnShift) {
+        if (!i.all_front) transmitted_weight = transmitted_weight * S::Masking::OverVisible(d, i, drawn);
+      } else if constexpr (!Drawer::kNIsSigma) {
         V numerator = drawn.two_n;
         if constexpr (S::Distribution::kShifts && !Drawer::kShifted)
           if (!i.all_front) numerator = numerator * Exp(d, i.shift);
@@ -244,7 +245,6 @@ struct ScatterQuery {
     auto reached = Select2(reflects, And(straight, h2 > Set(d, 0x1p-40f)),
                            And(And(And(z<zero, hz> zero), And(dot_i > zero, dot_o < zero)), h2 > Set(d, 1e-30f)));
     if (tile.transmits) reached = And(reached, Not(reflects));
-    if (!i.all_front) reached = AndNot(S::Masking::SeesNothing(d, i), reached);
 
     const V length2 = Select(reached, h2, one);
     const V inverse_length = one / Sqrt(length2);
@@ -272,10 +272,8 @@ struct ScatterQuery {
     const V jacobian = Select(reflects, one, four * c * (eta * eta) * om / length2);
 
     if (tile.wanted & kWantsPdf) {
-      const V two_n = Drawer::TwoN(d, i, mx, my, mz, c);
-      V numerator = density;
-      if constexpr (Distribution::kShifts && !Drawer::kShifted)
-        if (!i.all_front) numerator = IfThenElseZero(reached, Distribution::Density(d, i, mx, my, mz, one, zero));
+      V numerator = density, two_n;
+      SampledDensity<Drawer>(d, i, mx, my, mz, one, c, reached, numerator, two_n);
       const V pdf = Min(Min(numerator / (denominator * two_n), largest) * jacobian * branch, largest);
       Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
     }
@@ -294,7 +292,6 @@ struct ScatterQuery {
     // A reflection that no microfacet makes is no occluded one, as in pdf_reflection.
     auto answered = Or(reflects, reached);
     if (tile.transmits) answered = reached;
-    if (!i.all_front) answered = AndNot(S::Masking::SeesNothing(d, i), answered);
     exceptions.Finish(tile, lane, Not(answered), statistics);
   }
 

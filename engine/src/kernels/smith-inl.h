@@ -24,10 +24,6 @@ struct Smith {
   static HWY_INLINE void BiasedArea(D d, I& i) {
     I::Distribution::BiasedArea(d, i);
   }
-  template <class D, class I>
-  static HWY_INLINE Mask<D> SeesNothing(D d, const I&) {
-    return NoLanes(d);
-  }
 
   // w = f cos(theta_o) / pdf_visible(o), as numerator and denominator, for o_z > 0. With z' of o,
   // Lambda(o) = sigma(-o) / z'(o), so that

@@ -18,7 +18,6 @@ namespace HWY_NAMESPACE {
 
 struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   static constexpr bool kLongChains = true;
-  static constexpr bool kCavityBehind = true;
 
   // nu + z, and nu itself, for w stretched by sqrt(2) more; behind by its conjugate.
   template <class D, class V = Vec<D>>

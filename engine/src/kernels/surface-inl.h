@@ -43,7 +43,6 @@ struct DistributionTraits {
   static constexpr bool kLongChains = false;          // sampling gains from pairs of vectors
   static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
   static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
-  static constexpr bool kCavityBehind = false;        // V-cavity has samplers for i_z <= 0
 };
 
 // Distribution: a policy as described in docs/adding.md.
@@ -70,6 +69,7 @@ struct Incident {
   V two_sigma;       // 2 sigma(i), times exp(shift)
   V two_normaliser;  // the same as densities are normalised: Normalisation
   V shift;           // of distributions whose sigma underflows: density and area are both kept times exp(shift)
+  V area_shift;      // that of two_sigma, also where two_normaliser has none
   Mask<D> front;     // i_z > 0
   Mask<D> ahead;     // w_z > 0
   bool all_front;    // both, in all lanes

@@ -69,6 +69,16 @@ struct Tabulated : DistributionTraits {
   static HWY_INLINE void BiasedArea(D d, I& i) {
     i.two_normaliser = TwoArea(d, i, i.wx, i.wy, Abs(i.wz));
   }
+  // V-cavity behind: 2 H = 2 (sigma(k) - sigma(3 k)) / k with k = |i_z| / sqrt(A). Below kNearest, where that cancels, H
+  // is linear in k to its third power.
+  template <class D, class I, class V = Vec<D>>
+  static HWY_NOINLINE void TwoHit(D d, const I& i, V& two_hit, V&) {
+    const V one = Set(d, 1.0f), zero = Zero(d), two = Set(d, 2.0f), near = Set(d, 0x1p-6f);
+    const V at = Abs(i.z) / Sqrt(Max(i.a, Set(d, kSmallestA))), k = Max(at, near);
+    const V hit = (TwoArea(d, i, one, zero, Neg(k)) - TwoArea(d, i, one, zero, Set(d, -3.0f) * k)) / k;
+    const V part = Min(at / near, one);
+    two_hit = Max(Fma(part, hit - two, two), Set(d, 1e-25f));
+  }
   // sigma(-o) is sigma(o) - z' of centred normals.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Areas(D d, const I& i, V wx, V wy, V z, V, V& front, V& back, V& scale) {
@@ -146,7 +156,7 @@ struct TableNdf : TableNormals<TableNdf> {
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     const V one = Set(d, 1.0f), zero = Zero(d);
     V mx, my, mz, drawing;
-    DrawVisibleNormal(d, *i.table, one, zero, one, zero, u1, u2, mx, my, mz, drawing);
+    DrawVisibleNormal(d, *i.table, one, zero, one, zero, u1, one - u1, u2, mx, my, mz, drawing);
     Finish(d, i, mx, my, mz, drawing, drawn);
   }
 };
@@ -160,14 +170,17 @@ struct TableVisible : TableNormals<TableVisible> {
   }
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
+    const V one = Set(d, 1.0f);
     V c, s, ex, ey, nu, mx, my, mz, drawing;
     Tabulated::Seen(d, i, i.wx, i.wy, i.wz, c, s, ex, ey, nu);
-    DrawVisibleNormal(d, *i.table, c, s, ex, ey, u1, u2, mx, my, mz, drawing);
+    DrawVisibleNormal(d, *i.table, c, s, ex, ey, u1, one - u1, u2, mx, my, mz, drawing);
     Finish(d, i, mx, my, mz, drawing, drawn);
   }
 };
 
-// V-cavity in front, of a radial table: a normal as TableNdf draws it or its mirror image, by how much they face i.
+// V-cavity, of a radial table. In front a normal as TableNdf draws it or its mirror image, by how much they face i.
+// Behind as Tokuyoshi 2021, section 2.3: with a share 2 F / H a normal whose slope along w's azimuth is below -3 k, else
+// a visible one beyond. F is the share of the former among all that TableNdf draws.
 struct TableCavity : TableNormals<TableCavity> {
   static constexpr bool kUsesU3 = true;
 
@@ -177,23 +190,74 @@ struct TableCavity : TableNormals<TableCavity> {
     const V across = Fma(i.wx, mx, i.wy * my), up = i.wz * mz;
     const V facing = Max(up + across, zero), other = Max(up - across, zero);
     const V both = TableNdf::DrawingDensity(d, i, mx, my, mz) + TableNdf::DrawingDensity(d, i, Neg(mx), Neg(my), mz);
-    return both * facing / Max(facing + other, Set(d, kSmallestIm));
+    const V in_front = both * facing / Max(facing + other, Set(d, kSmallestIm));
+    if (i.all_front) return in_front;
+    const Behind<D> at(d, i);
+    const auto first = across > Set(d, -3.0f) * up;
+    V c, s;
+    at.See(d, first, c, s);
+    const V share = Select(first, at.probability / Max(at.below, Set(d, kTiny)),
+                           (Set(d, 1.0f) - at.probability) / Max(at.rest, Set(d, kTiny)));
+    const V behind = share * VisibleNormalDensity(d, *i.table, c, s, at.ex, at.ey, mx, my, mz);
+    return Select(i.front, in_front, behind * (i.two_sigma / i.two_normaliser));
   }
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V& u3, Drawn<D>& drawn) {
     const V one = Set(d, 1.0f), zero = Zero(d), below_one = Set(d, kLargestBelowOne);
+    V c = one, s = zero, ex = one, ey = zero, rest1 = one - u1, behind_u3 = u3;
+    if (!i.all_front) {
+      const Behind<D> at(d, i);
+      const auto first = u3 < at.probability;
+      behind_u3 = Select(first, u3, u3 - at.probability) /
+                  Max(Select(first, at.probability, one - at.probability), Set(d, kTiny));
+      V behind_c, behind_s;
+      at.See(d, first, behind_c, behind_s);
+      const V low = u1 * at.below, high = rest1 * at.rest;
+      c = Select(i.front, c, behind_c);
+      s = Select(i.front, s, behind_s);
+      ex = Select(i.front, ex, at.ex);
+      ey = Select(i.front, ey, at.ey);
+      u1 = Select(i.front, u1, Select(first, low, one - high));
+      rest1 = Select(i.front, rest1, Select(first, one - low, high));
+    }
     V mx, my, mz, unused;
-    DrawVisibleNormal(d, *i.table, one, zero, one, zero, u1, u2, mx, my, mz, unused);
+    DrawVisibleNormal(d, *i.table, c, s, ex, ey, u1, rest1, u2, mx, my, mz, unused);
     const V across = Fma(i.wx, mx, i.wy * my), up = i.wz * mz;
     const V a1 = Max(up + across, zero), a2 = Max(up - across, zero);
     const V at = u3 * (a1 + a2);
-    const auto mirrored = And(at >= a1, a2 > zero);
+    const auto mirrored = And(And(at >= a1, a2 > zero), i.front);
     const V sign = IfThenElseZero(mirrored, SignBit(d));
     mx = Xor(mx, sign);
     my = Xor(my, sign);
-    u3 = Min(Max(Select(mirrored, at - a1, at) / Max(Select(mirrored, a2, a1), Set(d, kSmallestIm)), zero), below_one);
+    u3 = Select(mirrored, at - a1, at) / Max(Select(mirrored, a2, a1), Set(d, kSmallestIm));
+    u3 = Min(Max(Select(i.front, u3, behind_u3), zero), below_one);
     Finish(d, i, mx, my, mz, DrawingDensity(d, i, mx, my, mz), drawn);
   }
+
+ private:
+  template <class D>
+  struct Behind {
+    using V = Vec<D>;
+    V c, s, ex, ey;
+    V below, rest;  // F; the share of the visible normals beyond -3 k
+    V probability;
+    template <class I>
+    HWY_INLINE Behind(D d, const I& i) {
+      const V one = Set(d, 1.0f), zero = Zero(d);
+      V nu, unused;
+      Tabulated::Seen(d, i, i.wx, i.wy, i.wz, c, s, ex, ey, nu);
+      const V c3 = Set(d, 3.0f) * Abs(c);
+      const V rise = OnePlusHalfTangent(d, Sqrt(Fma(s, s, c3 * c3)), s, Neg(c3));
+      ShareBelowTilt(d, *i.table, one, zero, ex, ey, rise, below, unused);
+      ShareBelowTilt(d, *i.table, c, s, ex, ey, rise, unused, rest);
+      probability = Min(Set(d, 4.0f) * below / i.two_sigma, one);
+    }
+    // From where a part's normals are drawn.
+    HWY_INLINE void See(D d, Mask<D> first, V& cos, V& sin) const {
+      cos = Select(first, Set(d, 1.0f), c);
+      sin = Select(first, Zero(d), s);
+    }
+  };
 };
 
 }  // namespace HWY_NAMESPACE

@@ -23,23 +23,18 @@ struct VCavity {
     const auto two = Set(d, 2.0f);
     i.shift = Zero(d);
     i.two_sigma = two;
-    if constexpr (I::Distribution::kCavityBehind)
-      if (!i.all_front) {
-        auto hit = two;
-        I::Distribution::TwoHit(d, i, hit, i.shift);
-        i.two_sigma = Select(i.front, two, hit);
-      }
+    if (!i.all_front) {
+      auto hit = two;
+      I::Distribution::TwoHit(d, i, hit, i.shift);
+      i.two_sigma = Select(i.front, two, hit);
+    }
+    i.area_shift = i.shift;
   }
   // All counted as hit.
   template <class D, class I>
   static HWY_INLINE void BiasedArea(D d, I& i) {
     i.two_normaliser = Set(d, 2.0f);
     i.shift = Zero(d);
-  }
-  // Lanes that see nothing: behind, where the distribution has no H.
-  template <class D, class I>
-  static HWY_INLINE Mask<D> SeesNothing(D d, const I& i) {
-    return I::Distribution::kCavityBehind ? NoLanes(d) : Not(i.front);
   }
 
   // f cos(theta_o) = D min(G(i, m), G(o, m)) / (4 H |i_z|), with |i_z| divided out, as D w / (2 two_n).
@@ -48,7 +43,6 @@ struct VCavity {
     const V iz = Max(Abs(i.z), Set(d, kTiny));
     const V r = (mz + mz) / im;
     w = Min(r * Min(iz, oz), Set(d, 1.0f)) / iz;
-    if constexpr (!I::Distribution::kCavityBehind) w = IfThenElseZero(i.front, w);
     two_n = i.two_normaliser;
   }
 
@@ -58,7 +52,10 @@ struct VCavity {
       // min(G(i, m), G(o, m)) / G(i, m)
       const V one = Set(d, 1.0f), iz = Max(Abs(i.z), Set(d, kTiny));
       const V r = (drawn.mz + drawn.mz) / drawn.im;
-      return Min(r * Min(iz, oz), one) / Min(r * iz, one);
+      V w = Min(r * Min(iz, oz), one) / Min(r * iz, one);
+      if constexpr (Drawer::kOwnShift)
+        if (!i.all_front) w = Min(w * OverVisible(d, i, drawn), Set(d, kLargestDensity));
+      return w;
     } else {
       V two_n, w;
       Value(d, i, drawn.mz, drawn.im, ox, oy, oz, uncorrelated, two_n, w);
@@ -74,8 +71,13 @@ struct VCavity {
   static HWY_INLINE V VisibleTwoN(D d, const I& i, V mz, V im) {
     const V iz = Max(Abs(i.z), Set(d, kTiny));
     const V n = Max(im / (mz + mz), iz);
-    if constexpr (I::Distribution::kCavityBehind) return i.two_normaliser * n;
-    return Select(i.front, i.two_normaliser * n, Set(d, kLargestDensity));
+    return i.two_normaliser * n;
+  }
+
+  // N over that of visible normals, of samplers with the latter in front.
+  template <class D, class I, class Drawn, class V = Vec<D>>
+  static HWY_INLINE V OverVisible(D d, const I& i, const Drawn& drawn) {
+    return drawn.two_n / VisibleTwoN(d, i, drawn.mz, drawn.im) * Exp(d, i.shift - drawn.shift);
   }
 
   // The same microfacet seen from both sides is masked alike: G(o, m) / G(i, m) beyond G(i, m).
@@ -94,7 +96,6 @@ struct VCavity {
     area = i.two_sigma * (Abs(i.z) * Set(d, 0.5f));
     if constexpr (I::Distribution::kShifts)
       if (!i.all_front) area = area * Exp(d, Neg(i.shift));
-    area = IfThenElseZero(Not(SeesNothing(d, i)), area);
   }
   template <class D, class I>
   static HWY_INLINE Vec<D> ShareUnoccluded(D d, const I&) {

@@ -39,19 +39,16 @@ struct CavityVisible : SlopeNormals, VisibleNormals {
     const V left = Min(Max(Select(mirrored, at - a1, at) / Max(im, Set(d, kSmallestIm)), zero), below_one);
     x = Xor(x, sign);
     y = Xor(y, sign);
-    if constexpr (I::Distribution::kCavityBehind)
-      if (!i.all_front) {
-        V bx, by, bim, bu3 = u3;
-        I::Distribution::DrawBehindCavity(d, i, u1, u2, bu3, bx, by, bim);
-        x = Select(i.front, x, bx);
-        y = Select(i.front, y, by);
-        im = Select(i.front, im, bim);
-        u3 = Select(i.front, left, bu3);
-      } else {
-        u3 = left;
-      }
-    else
+    if (!i.all_front) {
+      V bx, by, bim, bu3 = u3;
+      I::Distribution::DrawBehindCavity(d, i, u1, u2, bu3, bx, by, bim);
+      x = Select(i.front, x, bx);
+      y = Select(i.front, y, by);
+      im = Select(i.front, im, bim);
+      u3 = Select(i.front, left, bu3);
+    } else {
       u3 = left;
+    }
     FromSlope(d, i, x, y, drawn);
     drawn.im = Max(im, Set(d, kSmallestIm));
     drawn.two_n = TwoN(d, i, drawn.mx, drawn.my, drawn.mz, drawn.im);

@@ -115,15 +115,15 @@ struct TableRow {
   HWY_INLINE V Width(D d, V low, V high) const { return Max(high - low, Set(d, 0x1p-24f)); }
 };
 
-// The value that u draws from a row, and its density there. Cells are counted from the nearer end: cell j
+// The value that u draws from a row, and its density there. `rest`: 1 - u. Cells are counted from the nearer end: cell j
 // ends at 2 ((j + 1) / n)^2.
 template <class D, class V = Vec<D>>
-HWY_INLINE V DrawFrom(D d, const TableRow<D>& row, std::int32_t uniforms, V u, V& density) {
+HWY_INLINE V DrawFrom(D d, const TableRow<D>& row, std::int32_t uniforms, V u, V rest, V& density) {
   const Rebind<std::int32_t, D> di{};
   const float n = static_cast<float>(uniforms);
   const V one = Set(d, 1.0f), zero = Zero(d);
   const auto lower = u < Set(d, 0.5f);
-  const V end = Select(lower, u, one - u);
+  const V end = Select(lower, u, rest);
   const V squares = Select(end > zero, end, zero) * Set(d, 0.5f * n * n);
   const TableIndex<D> j = ConvertTo(di, Min(Sqrt(squares), Set(d, 0.5f * n - 1.0f)));
   const V from = ConvertTo(d, j);
@@ -138,29 +138,58 @@ HWY_INLINE V DrawFrom(D d, const TableRow<D>& row, std::int32_t uniforms, V u, V
   return Between(low, high, within);
 }
 
+// The cell of a row in which a value lies.
+template <class D>
+struct TableCell {
+  using V = Vec<D>;
+  V low, width;
+  V from, odd;    // it begins at from^2 steps from the nearer end, and has as many as `odd`
+  Mask<D> upper;  // the nearer end is the upper
+  HWY_INLINE TableCell(D d, const TableRow<D>& row, std::int32_t uniforms, V value) {
+    const Rebind<std::int32_t, D> di{};
+    const float n = static_cast<float>(uniforms);
+    const V zero = Zero(d), one = Set(d, 1.0f), last = Set(d, n - 1.0f);
+    V node = zero;
+    for (float step = 0.5f * n; step >= 1.0f; step *= 0.5f) {
+      const V further = node + Set(d, step);
+      node = Select(row.Nearest(d, ConvertTo(di, further)) <= value, further, node);
+    }
+    // The interpolated row's cell is that of the nearest row, or one near it.
+    low = zero;
+    V high = one;
+    for (std::int32_t steps = 0; steps < uniforms; ++steps) {
+      const TableIndex<D> k = ConvertTo(di, node);
+      low = row.At(d, k);
+      high = row.At(d, k + Set(di, 1));
+      const auto down = And(low > value, node > zero), up = And(high <= value, node < last);
+      if (AllFalse(d, Or(down, up))) break;
+      node = node + IfThenElseZero(up, one) - IfThenElseZero(down, one);
+    }
+    from = Min(node, last - node);
+    upper = last - node < node;
+    odd = Fma(from, Set(d, 2.0f), one);
+    width = row.Width(d, low, high);
+  }
+};
+
 // The density of DrawFrom() at a value.
 template <class D, class V = Vec<D>>
 HWY_INLINE V DensityFrom(D d, const TableRow<D>& row, std::int32_t uniforms, V value) {
-  const Rebind<std::int32_t, D> di{};
   const float n = static_cast<float>(uniforms);
-  const V zero = Zero(d), one = Set(d, 1.0f), last = Set(d, n - 1.0f);
-  V node = zero;
-  for (float step = 0.5f * n; step >= 1.0f; step *= 0.5f) {
-    const V further = node + Set(d, step);
-    node = Select(row.Nearest(d, ConvertTo(di, further)) <= value, further, node);
-  }
-  // The interpolated row's cell is that of the nearest row, or one near it.
-  V low = zero, high = one;
-  for (std::int32_t steps = 0; steps < uniforms; ++steps) {
-    const TableIndex<D> k = ConvertTo(di, node);
-    low = row.At(d, k);
-    high = row.At(d, k + Set(di, 1));
-    const auto down = And(low > value, node > zero), up = And(high <= value, node < last);
-    if (AllFalse(d, Or(down, up))) break;
-    node = node + IfThenElseZero(up, one) - IfThenElseZero(down, one);
-  }
-  const V odd = Fma(Min(node, last - node), Set(d, 2.0f), one);
-  return odd * Set(d, 2.0f / (n * n)) / row.Width(d, low, high);
+  const TableCell<D> cell(d, row, uniforms, value);
+  return cell.odd * Set(d, 2.0f / (n * n)) / cell.width;
+}
+// The u with which DrawFrom() draws a value, and 1 - u.
+template <class D, class V = Vec<D>>
+HWY_INLINE void ShareBelow(D d, const TableRow<D>& row, std::int32_t uniforms, V value, V& share, V& rest) {
+  const float n = static_cast<float>(uniforms);
+  const V zero = Zero(d), one = Set(d, 1.0f);
+  const TableCell<D> cell(d, row, uniforms, value);
+  V within = Min(Max((value - cell.low) / cell.width, zero), one);
+  within = Select(cell.upper, one - within, within);
+  const V end = Fma(within, cell.odd, cell.from * cell.from) * Set(d, 2.0f / (n * n));
+  share = Select(cell.upper, one - end, end);
+  rest = Select(cell.upper, end, one - end);
 }
 
 template <class D, class V = Vec<D>>
@@ -174,20 +203,20 @@ HWY_INLINE TableRow<D> SideRow(D d, const SlopeTableView& view, const TableIncid
   return TableRow<D>(d, view, view.side, view.slopes, place, incident);
 }
 
-// A visible normal m, m_z > 0, and the density per solid angle with which the tables draw it.
+// A visible normal m, m_z > 0, and the density per solid angle with which the tables draw it. `rest1`: 1 - u1.
 template <class D, class V = Vec<D>>
 HWY_NOINLINE void DrawVisibleNormal(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi,
-                                    V u1, V u2, V& mx, V& my, V& mz, V& density) {
+                                    V u1, V rest1, V u2, V& mx, V& my, V& mz, V& density) {
   const V one = Set(d, 1.0f), two = Set(d, 2.0f), least = Set(d, 0x1p-22f);
   const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
   V tilt, side;
-  const V rise = Max(DrawFrom(d, TiltRow(d, view, incident), view.uniforms, u1, tilt) * incident.reach, least);
+  const V rise = Max(DrawFrom(d, TiltRow(d, view, incident), view.uniforms, u1, rest1, tilt) * incident.reach, least);
   const V s = rise - one;
   const V square = Fma(s, s, one);
   const V cos_chi = Max(rise * (two - rise) / square, least);
   const V sin_chi = two * s / square;
   const V most = Set(d, 1.0f - 0x1p-22f);
-  V h = DrawFrom(d, SideRow(d, view, incident, rise), view.uniforms, u2, side);
+  V h = DrawFrom(d, SideRow(d, view, incident, rise), view.uniforms, u2, one - u2, side);
   h = Max(Min(h, most), Neg(most));
   const V c = Sqrt((one - h) * (one + h));
   const V along = sin_chi * c;
@@ -215,12 +244,20 @@ HWY_NOINLINE V VisibleNormalDensity(D d, const SlopeTableView& view, V cos_theta
   return IfThenElseZero(And(mz > zero, f <= one), density);
 }
 
+// The share of DrawVisibleNormal()'s normals whose tilt is below that of `rise`, and the rest.
+template <class D, class V = Vec<D>>
+HWY_NOINLINE void ShareBelowTilt(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi,
+                                 V rise, V& share, V& rest) {
+  const TableIncident<D> incident(d, view, cos_theta, sin_theta, cos_phi, sin_phi);
+  ShareBelow(d, TiltRow(d, view, incident), view.uniforms, Min(rise / incident.reach, Set(d, 1.0f)), share, rest);
+}
+
 // The same by slopes: x, y = -m_xy / m_z, densities per area of slopes.
 template <class D, class V = Vec<D>>
 HWY_INLINE void DrawVisibleSlope(D d, const SlopeTableView& view, V cos_theta, V sin_theta, V cos_phi, V sin_phi, V u1,
                                  V u2, V& x, V& y, V& density) {
   V mx, my, mz;
-  DrawVisibleNormal(d, view, cos_theta, sin_theta, cos_phi, sin_phi, u1, u2, mx, my, mz, density);
+  DrawVisibleNormal(d, view, cos_theta, sin_theta, cos_phi, sin_phi, u1, Set(d, 1.0f) - u1, u2, mx, my, mz, density);
   x = Neg(mx / mz);
   y = Neg(my / mz);
   density = density * mz * mz * mz;

@@ -76,7 +76,6 @@ double share_unoccluded(const Surface& surface, Vector i) {
 
 double albedo(const Surface& surface, Vector i) {
   i = turned(surface, i);
-  if (sees_nothing(surface, i)) return 0;
   return static_cast<double>(over_unoccluded(
       surface, i, 1e-9L, [&](Vector m, Real im, Vector o) { return reflected(surface, i, o, m, im) * 4 * im; }));
 }

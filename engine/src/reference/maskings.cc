@@ -9,12 +9,6 @@
 
 namespace facetwise::reference {
 
-bool sees_nothing(const Surface& surface, Vector i) {
-  const Distribution d = surface.model.distribution;
-  return surface.model.masking == Masking::vcavity && i.z <= 0 &&
-         (d == Distribution::phong || d == Distribution::table);
-}
-
 double masking(const Surface& surface, Vector i) {
   const Stretched w = stretched(surface, i);
   return w.z > 0 ? static_cast<double>(w.z / value(area(surface, w))) : 0;
@@ -51,6 +45,7 @@ Scaled hits(const Surface& surface, Vector i) {
                   },
                   1, 3, 0),
               0};
+    case Distribution::phong: return phong_hits(surface, i);
     default: return {(value(area(surface, w)) - value(area(surface, {w.x, w.y, 3 * w.z}))) / z, 0};
   }
 }

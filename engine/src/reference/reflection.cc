@@ -7,7 +7,6 @@
 #include "src/reference/vector.h"
 
 namespace facetwise::reference {
-namespace {
 
 // D (i.m)+ over sigma, or D min(2 m_z |i_z|, i.m)+ over H |i_z| with |i_z| divided out.
 Real visible_density(const Surface& surface, Vector i, Vector m, Real im) {
@@ -17,6 +16,8 @@ Real visible_density(const Surface& surface, Vector i, Vector m, Real im) {
   const Real seen = iz == 0 ? 2 * m.z : std::min<Real>(2 * m.z, im / iz);
   return quotient(d, vcavity_hits(surface, i)) * seen;
 }
+
+namespace {
 
 Real bounded_density(const Surface& surface, Vector i, Vector m, Real im) {
   if (surface.model.distribution != Distribution::ggx || surface.model.masking != Masking::smith ||
@@ -54,14 +55,17 @@ Vector turned(const Surface& surface, Vector i) { return surface.model.retro ? V
 
 Real sampled_density(const Surface& surface, Sampler sampler, Vector i, Vector m, Real im) {
   if (sampler == Sampler::ndf) return value(normal_density(surface, m)) * m.z;
-  if (sees_nothing(surface, i)) return 0;
   if (i.z > 0 && sampler == Sampler::bounded) return bounded_density(surface, i, m, im);
   if (i.z > 0 && sampler == Sampler::exact) return exact_density(surface, i, m, im);
+  if (i.z < 0 && surface.model.masking == Masking::vcavity && surface.model.distribution == Distribution::phong) {
+    const Real drawn = value(phong_behind(surface, i, m, im));
+    return surface.model.normalisation == Normalisation::biased ? drawn * value(phong_hits(surface, i)) : drawn;
+  }
   return visible_density(surface, i, m, im);
 }
 
 Real reflected(const Surface& surface, Vector i, Vector o, Vector m, Real im) {
-  if (o.z <= 0 || sees_nothing(surface, i)) return 0;
+  if (o.z <= 0) return 0;
   const Real weight =
       surface.model.masking == Masking::smith ? smith_shadowing(surface, i, o) : vcavity_shadowing(i, o, m, im);
   if (weight == 0) return 0;

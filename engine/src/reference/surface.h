@@ -34,11 +34,13 @@ Scaled hits(const Surface& surface, Vector i);
 Scaled smith_normaliser(const Surface& surface, Vector i);
 Scaled vcavity_hits(const Surface& surface, Vector i);  // 1 if biased
 
-// V-cavity has nothing to see from behind but with ggx and beckmann.
-bool sees_nothing(const Surface& surface, Vector i);
+// Phong with V-cavity, i_z < 0: H, and the density of the normals that `visible` draws.
+Scaled phong_hits(const Surface& surface, Vector i);
+Scaled phong_behind(const Surface& surface, Vector i, Vector m, Real im);
 bool is_centred(const Surface& surface);  // no mean slope
 
 // Densities of normals, im = i.m > 0. The reflection of `bounded` and `exact` is taken not to be occluded.
+Real visible_density(const Surface& surface, Vector i, Vector m, Real im);
 Real sampled_density(const Surface& surface, Sampler sampler, Vector i, Vector m, Real im);
 // The same without D(m) underflowing: of `exact` for i_z > 0 (unoccluded.cc).
 Real exact_density(const Surface& surface, Vector i, Vector m, Real im);

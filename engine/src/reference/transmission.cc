@@ -74,7 +74,7 @@ double evaluate_transmission(const Surface& surface, Vector i, Vector o) {
   if (!r.exists() || surface.model.interface != Interface::dielectric) return 0;
   const Real scale =
       surface.model.transport == Transport::radiance ? 1 / (static_cast<Real>(surface.eta) * surface.eta) : 1;
-  const Real visible = sampled_density(surface, Sampler::visible, i, r.m, r.im) * r.jacobian;
+  const Real visible = visible_density(surface, i, r.m, r.im) * r.jacobian;
   return static_cast<double>((1 - fresnel(surface, static_cast<double>(r.im))) * visible * scale *
                              shadowing(surface, i, o, r));
 }
