@@ -71,6 +71,23 @@ void EngineArguments::add_remote(CLI::App& app) {
       ->expected(1, -1)
       ->allow_extra_args(false)  // so that `--remote A B` is an error
       ->option_text("ADDRESS[,ADDRESS...]");
+  add_connection(app, connection);
+}
+
+void add_connection(CLI::App& app, ConnectOptions& connection) {
+  const auto add_file = [&](const char* flag, std::string& file, const char* help) {
+    app.add_option(flag, file, help)->option_text("FILE")->group("Servers that ask for more");
+  };
+  add_file("--tls-ca", connection.tls_ca,
+           "TLS, to every HOST:PORT: who may have signed a server's certificate, PEM; Debian's authorities are "
+           "/etc/ssl/certs/ca-certificates.crt");
+  add_file("--tls-certificate", connection.tls_certificate,
+           "This client's certificate, PEM, for servers that ask for one");
+  add_file("--tls-key", connection.tls_key, "The certificate's key");
+  add_file("--token-file", connection.token_file, "A file whose first line is the token that the server asks for");
+  app.add_option("--tls-name", connection.tls_name, "The name in the server's certificate, where it is not the host's")
+      ->option_text("NAME")
+      ->group("Servers that ask for more");
 }
 
 void EngineArguments::add_target(CLI::App& app) {
@@ -81,7 +98,7 @@ void EngineArguments::add_target(CLI::App& app) {
 absl::StatusOr<std::unique_ptr<Engine>> EngineArguments::open() const {
   if (!remote.empty()) {
     if (target != Target::best) return invalid("--target: a server chooses its own; leave out --target or --remote");
-    return connect(remote);
+    return connect(remote, connection);
   }
   if (!resolve(target)) return invalid("--target: this CPU or build has no {}", name(target));
   return local_engine({.target = target});

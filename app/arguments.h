@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "facetwise/client.h"
 #include "facetwise/engine.h"
 
 namespace facetwise::app {
@@ -44,9 +45,13 @@ struct ModelArguments {
   absl::StatusOr<Model> open() const;
 };
 
+// How a server is reached: --tls-ca, --tls-certificate, --tls-key, --tls-name, --token-file.
+void add_connection(CLI::App& app, ConnectOptions& connection);
+
 // Which engine runs a call: this machine's, or servers.
 struct EngineArguments {
   std::vector<std::string> remote;
+  ConnectOptions connection;
   Target target = Target::best;
 
   void add_remote(CLI::App& app);

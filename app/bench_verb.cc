@@ -29,7 +29,8 @@ struct BenchVerb {
       if (!created.ok()) return fail("bench", created.status());
       file.emplace(*std::move(created));
     }
-    const auto report = at.empty() ? run_here() : benchmark_server(at, options.filter, options.min_seconds, show);
+    const auto report =
+        at.empty() ? run_here() : benchmark_server(at, engine.connection, options.filter, options.min_seconds, show);
     if (!report.ok()) return fail("bench", report.status());
     fmt::print("{}", bench_table(*report));
     if (!file) return kDone;
@@ -46,7 +47,7 @@ struct BenchVerb {
     options.targets = !no_targets;
     std::unique_ptr<Engine> remote;
     if (!engine.remote.empty()) {
-      auto connected = connect(engine.remote);
+      auto connected = connect(engine.remote, engine.connection);
       if (!connected.ok()) return connected.status();
       remote = *std::move(connected);
       options.remote = remote.get();

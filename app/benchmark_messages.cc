@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "facetwise/channel.h"
 #include "facetwise/v1/sampler.grpc.pb.h"
 
 namespace facetwise::app {
@@ -67,14 +68,18 @@ BenchmarkRunner benchmark_runner(Target target, int threads) {
   };
 }
 
-absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const std::string& filter, double min_seconds,
+absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const ConnectOptions& options,
+                                             const std::string& filter, double min_seconds,
                                              const BenchCallback& progress) {
   constexpr std::chrono::seconds kPatience{5};
   const auto failed = [&](const grpc::Status& status) {
     return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
   };
-  const auto stub = v1::Sampler::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  const auto channel = open_channel(address, options);
+  if (!channel.ok()) return channel.status();
+  const auto stub = v1::Sampler::NewStub(channel->channel);
   grpc::ClientContext info_context;
+  channel->authorise(info_context);
   info_context.set_deadline(std::chrono::system_clock::now() + kPatience);
   v1::InfoResponse info;
   if (const auto status = stub->Info(&info_context, {}, &info); !status.ok()) return failed(status);
@@ -84,6 +89,7 @@ absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const s
   report.threads = static_cast<int>(info.threads());
 
   grpc::ClientContext context;
+  channel->authorise(context);
   v1::BenchmarkRequest request;
   request.set_filter(filter);
   request.set_min_seconds(min_seconds);

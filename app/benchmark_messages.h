@@ -5,6 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "facetwise/bench.h"
+#include "facetwise/client.h"
 #include "facetwise/server.h"
 
 namespace facetwise::app {
@@ -14,7 +15,8 @@ BenchmarkRunner benchmark_runner(Target target, int threads);
 
 // Asks a server to benchmark its machine. `progress` is called after each result. Errors begin with
 // "server ADDRESS:".
-absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const std::string& filter, double min_seconds,
+absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const ConnectOptions& options,
+                                             const std::string& filter, double min_seconds,
                                              const BenchCallback& progress);
 
 }  // namespace facetwise::app

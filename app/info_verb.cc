@@ -13,6 +13,7 @@
 #include "app/errors.h"
 #include "app/verbs.h"
 #include "bench/machine.h"
+#include "facetwise/channel.h"
 #include "facetwise/v1/sampler.grpc.pb.h"
 
 namespace facetwise::app {
@@ -34,10 +35,13 @@ Json local_info() {
           {"memory_bytes", memory_bytes()}};
 }
 
-absl::StatusOr<Json> remote_info(const std::string& address) {
+absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOptions& options) {
   constexpr std::chrono::seconds kPatience{5};
-  const auto stub = v1::Sampler::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  const auto channel = open_channel(address, options);
+  if (!channel.ok()) return channel.status();
+  const auto stub = v1::Sampler::NewStub(channel->channel);
   grpc::ClientContext context;
+  channel->authorise(context);
   context.set_deadline(std::chrono::system_clock::now() + kPatience);
   v1::InfoResponse info;
   const grpc::Status status = stub->Info(&context, {}, &info);
@@ -69,6 +73,7 @@ void print(const Json& info) {
 Verb add_info(CLI::App& app) {
   struct Arguments {
     std::string remote;
+    ConnectOptions connection;
     bool json = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -76,10 +81,12 @@ Verb add_info(CLI::App& app) {
   command.footer("Examples:\n  facetwise info\n  facetwise info --json --remote unix:/tmp/facetwise.sock");
   command.add_option("--remote", arguments->remote, "A server's instead of this machine's: unix:PATH or HOST:PORT")
       ->option_text("ADDRESS");
+  add_connection(command, arguments->connection);
   command.add_flag("--json", arguments->json, "As JSON");
   return {&command, [arguments] {
-            const absl::StatusOr<Json> info =
-                arguments->remote.empty() ? absl::StatusOr<Json>(local_info()) : remote_info(arguments->remote);
+            const absl::StatusOr<Json> info = arguments->remote.empty()
+                                                  ? absl::StatusOr<Json>(local_info())
+                                                  : remote_info(arguments->remote, arguments->connection);
             if (!info.ok()) return fail("info", info.status());
             if (arguments->json)
               fmt::print("{}\n", info->dump(1));

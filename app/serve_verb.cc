@@ -58,11 +58,13 @@ Verb add_serve(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("serve", "Answer the library's calls over gRPC until SIGTERM");
   command.footer(
       R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol
-is proto/facetwise/v1/sampler.proto; health checks and reflection are on. There is no authentication: listen on a Unix
-socket or on 127.0.0.1; with --insecure on a network whose every user may call.
+is proto/facetwise/v1/sampler.proto; health checks and reflection are on. For other machines give a certificate
+(--tls-certificate, --tls-key), and ask for tokens (--token-file) or for clients' certificates (--tls-client-ca). All
+these files are read again when they change.
 
 Examples:
   facetwise serve --listen unix:/tmp/facetwise.sock
+  facetwise serve --listen 0.0.0.0:7777 --tls-certificate server.pem --tls-key server.key --token-file tokens.txt
   facetwise serve --listen 127.0.0.1:7777 --listen unix:/run/facetwise.sock --unix-mode 0660 --threads 8)");
   command
       .add_option("--listen", options.listen,
@@ -93,8 +95,17 @@ Examples:
                   "Longest wait for a stream's next message; default 300")
       ->check(CLI::Range(1, 86400))
       ->option_text("N");
+  const auto add_file = [&](const char* flag, std::string& file, const char* help) {
+    command.add_option(flag, file, help)->option_text("FILE");
+  };
+  add_file("--tls-certificate", options.tls_certificate,
+           "TLS on every HOST:PORT: the server's certificate with those that signed it, PEM");
+  add_file("--tls-key", options.tls_key, "The certificate's key, PEM");
+  add_file("--tls-client-ca", options.tls_client_ca, "Take only clients with a certificate signed by one of these");
+  add_file("--token-file", options.token_file,
+           "Take only calls with one of these tokens (a line each, 16 characters at least)");
   command.add_flag("--insecure", options.insecure,
-                   "Allow --listen on addresses that other machines reach, without encryption or authentication");
+                   "Allow --listen on addresses that other machines reach, without TLS");
   command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
       ->check(check_mode)
       ->option_text("MODE");

@@ -40,6 +40,10 @@ int main(int argc, char** argv) {
   app.add_option("--read-ms", read_ms);
   app.add_option("--idle-ms", idle_ms);
   app.add_flag("--insecure", options.insecure);
+  app.add_option("--tls-certificate", options.tls_certificate);
+  app.add_option("--tls-key", options.tls_key);
+  app.add_option("--tls-client-ca", options.tls_client_ca);
+  app.add_option("--token-file", options.token_file);
   app.add_flag("--allow-benchmark", options.allow_benchmark);
   CLI11_PARSE(app, argc, argv);
   options.drain_timeout = std::chrono::milliseconds(drain_ms);

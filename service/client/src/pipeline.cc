@@ -57,7 +57,7 @@ class Sender {
   // Calls on a connection that was lost would fail before it is made again.
   absl::Status wait_for_connections() const {
     const auto until = std::chrono::system_clock::now() + options_.connect_timeout;
-    for (const Connection& connection : connections_) {
+    for (const auto& [connection, stub] : connections_) {
       if (connection.channel->GetState(true) == GRPC_CHANNEL_READY || connection.channel->WaitForConnected(until))
         continue;
       return absl::UnavailableError(absl::StrCat("server ", connection.address, ": no connection within ",
@@ -81,6 +81,7 @@ class Sender {
     ++load_[call.connection];
     call.context.emplace();
     call.context->set_deadline(std::chrono::system_clock::now() + options_.call_timeout);
+    connections_[call.connection].channel.authorise(*call.context);
     call.response.Clear();
     call.in_flight = true;
     ++in_flight_;
@@ -94,7 +95,7 @@ class Sender {
     call.in_flight = false;
     --in_flight_;
     --load_[call.connection];
-    const std::string& address = connections_[call.connection].address;
+    const std::string& address = connections_[call.connection].channel.address;
     if (!call.status.ok()) return wire::from_grpc(call.status, address);
     const absl::Status status = pieces_.decode(call.piece, call.response);
     if (status.ok()) return status;

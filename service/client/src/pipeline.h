@@ -8,15 +8,14 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "facetwise/client.h"
+#include "facetwise/channel.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
 
 namespace facetwise {
 
 struct Connection {
-  std::string address;
-  std::shared_ptr<grpc::Channel> channel;
+  Channel channel;
   std::unique_ptr<grpc::GenericStub> stub;
 };
 

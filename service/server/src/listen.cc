@@ -33,7 +33,7 @@ std::string unix_path(const std::string& address) {
   return address.starts_with(kUnix) ? address.substr(std::strlen(kUnix)) : "";
 }
 
-absl::Status check_address(const std::string& address, bool insecure) {
+absl::Status check_address(const std::string& address, bool anywhere) {
   const auto invalid = [&](absl::string_view what) {
     return absl::InvalidArgumentError(absl::StrCat("listen: \"", address, "\" ", what));
   };
@@ -62,11 +62,10 @@ absl::Status check_address(const std::string& address, bool insecure) {
       std::find(std::begin(kSchemes), std::end(kSchemes), inside) != std::end(kSchemes))
     return invalid("is neither unix:PATH nor HOST:PORT");
   const bool loopback = host.starts_with("127.") || host == "localhost" || host == "[::1]";
-  if (!loopback && !insecure)
+  if (!loopback && !anywhere)
     return invalid(
-        "is open to the network, without encryption or authentication: say so (--insecure), or listen on 127.0.0.1 or "
-        "a "
-        "Unix socket");
+        "is open to the network: give a certificate (--tls-certificate, --tls-key), or say that nothing protects it "
+        "(--insecure), or listen on 127.0.0.1 or a Unix socket");
   return absl::OkStatus();
 }
 

@@ -27,8 +27,8 @@ class SocketLock {
 
 // "unix:PATH": PATH. Anything else: empty.
 std::string unix_path(const std::string& address);
-// OK if `address` is "unix:PATH" or "HOST:PORT", the host being this machine's loopback unless `insecure`.
-absl::Status check_address(const std::string& address, bool insecure);
+// OK if `address` is "unix:PATH" or "HOST:PORT", the host being this machine's loopback unless `anywhere`.
+absl::Status check_address(const std::string& address, bool anywhere);
 // "HOST:PORT" with another port.
 std::string with_port(const std::string& address, int port);
 

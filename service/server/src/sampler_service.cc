@@ -20,7 +20,8 @@ SamplerService::SamplerService(const ServerOptions& options)
     : options_(options),
       limits_{options.max_message_bytes},
       admission_(options.max_calls, options.max_bytes_in_flight),
-      compute_(options.threads, options.execution) {
+      compute_(options.threads, options.execution),
+      tokens_(options.token_file) {
   add("/facetwise.v1.Sampler/Run", answer_batch, Messages::one);
   add("/facetwise.v1.Sampler/RunStream", answer_batch, Messages::many);
   add("/facetwise.v1.Sampler/Compact", answer_compact, Messages::one);
@@ -28,8 +29,8 @@ SamplerService::SamplerService(const ServerOptions& options)
   AddMethod(
       new RpcServiceMethod("/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
                            new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
-                               [](SamplerService* service, grpc::ServerContext*, const v1::InfoRequest*,
-                                  v1::InfoResponse* response) { return service->info(*response); },
+                               [](SamplerService* service, grpc::ServerContext* context, const v1::InfoRequest*,
+                                  v1::InfoResponse* response) { return service->info(*context, *response); },
                                this)));
   AddMethod(new RpcServiceMethod(
       "/facetwise.v1.Sampler/Benchmark", RpcMethod::SERVER_STREAMING,
@@ -53,6 +54,7 @@ void SamplerService::add(const char* name, Answer answer, Messages messages) {
 }
 
 grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& context, Stream& stream) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
   grpc::ByteBuffer request, another;
@@ -71,6 +73,7 @@ grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& cont
 }
 
 grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& context, Stream& stream) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
   Admission::Ticket ticket(admission_);
   if (!ticket.status().ok()) return to_grpc(ticket.status());
   for (grpc::ByteBuffer request;;) {
@@ -87,7 +90,8 @@ grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& con
   }
 }
 
-grpc::Status SamplerService::info(v1::InfoResponse& response) {
+grpc::Status SamplerService::info(grpc::ServerContext& context, v1::InfoResponse& response) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
   const std::string_view release = version();
   response.set_version(std::string(release));
   response.set_target(std::string(name(resolve(compute_.execution().target).value_or(Target::best))));
@@ -102,6 +106,7 @@ grpc::Status SamplerService::info(v1::InfoResponse& response) {
 
 grpc::Status SamplerService::benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
                                        grpc::ServerWriter<v1::BenchmarkProgress>& writer) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
   constexpr std::size_t kLongestFilter = 1000;
   if (!options_.allow_benchmark || !options_.benchmark)
     return error(grpc::StatusCode::PERMISSION_DENIED, "benchmarks are off: start the server with --allow-benchmark");

@@ -14,6 +14,7 @@
 #include "src/admission.h"
 #include "src/call.h"
 #include "src/compute.h"
+#include "src/tokens.h"
 #include "src/watch.h"
 
 namespace facetwise {
@@ -26,6 +27,8 @@ class SamplerService final : public grpc::Service {
  public:
   explicit SamplerService(const ServerOptions& options);
 
+  // Before the first call. Error: the file of tokens, and why.
+  absl::Status read_tokens() { return tokens_.read(); }
   Admission& admission() { return admission_; }
 
  private:
@@ -37,7 +40,7 @@ class SamplerService final : public grpc::Service {
   void add(const char* name, Answer answer, Messages messages);
   grpc::Status answer_one(Answer answer, grpc::ServerContext& context, Stream& stream);
   grpc::Status answer_many(Answer answer, grpc::ServerContext& context, Stream& stream);
-  grpc::Status info(v1::InfoResponse& response);
+  grpc::Status info(grpc::ServerContext& context, v1::InfoResponse& response);
   grpc::Status benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
                          grpc::ServerWriter<v1::BenchmarkProgress>& writer);
 
@@ -46,6 +49,7 @@ class SamplerService final : public grpc::Service {
   Admission admission_;
   Compute compute_;
   Watch watch_;
+  Tokens tokens_;
   std::atomic<bool> benchmark_runs_{false};
 };
 

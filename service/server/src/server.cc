@@ -14,6 +14,7 @@
 #include "grpcpp/resource_quota.h"
 #include "src/listen.h"
 #include "src/sampler_service.h"
+#include "src/tls.h"
 #include "wire/keep_grpc.h"
 
 namespace facetwise {
@@ -27,7 +28,9 @@ absl::Status check_options(const ServerOptions& options) {
   const auto invalid = [](absl::string_view what) { return absl::InvalidArgumentError(what); };
   if (options.listen.empty()) return invalid("listen: no address given: unix:PATH or HOST:PORT");
   for (const std::string& address : options.listen)
-    if (auto status = check_address(address, options.insecure); !status.ok()) return status;
+    if (auto status = check_address(address, options.insecure || !options.tls_certificate.empty()); !status.ok())
+      return status;
+  if (auto status = check_tls(options); !status.ok()) return status;
   if (options.unix_mode > 0777) return invalid("unix_mode: not permissions");
   if (options.threads < 0) return invalid("threads: below 0");
   if (options.max_message_bytes < 4096 || options.max_message_bytes > std::size_t{1} << 30)
@@ -67,6 +70,7 @@ class GrpcServer final : public Server {
 };
 
 absl::Status GrpcServer::listen() {
+  if (auto status = service_.read_tokens(); !status.ok()) return status;
   wire::keep_grpc();
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -91,6 +95,7 @@ absl::Status GrpcServer::listen() {
   quota.SetMaxThreads(options_.max_calls + 64);
   builder.SetResourceQuota(quota);
 
+  const auto tls = credentials(options_);
   std::vector<int> ports(options_.listen.size(), -1);
   bool any_unix = false;
   for (std::size_t k = 0; k < options_.listen.size(); ++k) {
@@ -101,7 +106,7 @@ absl::Status GrpcServer::listen() {
       if (!lock.ok()) return lock.status();
       sockets_.push_back(*std::move(lock));
     }
-    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &ports[k]);
+    builder.AddListeningPort(address, unix_path(address).empty() ? tls : grpc::InsecureServerCredentials(), &ports[k]);
   }
 
   // Sockets are made for nobody else first, so that nobody slips in before they have their permissions.

@@ -26,11 +26,18 @@ using BenchmarkReport = std::function<bool(const v1::BenchmarkProgress&)>;
 using BenchmarkRunner = std::function<absl::Status(const v1::BenchmarkRequest&, const BenchmarkReport&)>;
 
 struct ServerOptions {
-  // Where to listen: "unix:PATH" or "HOST:PORT", one or more. Port 0 takes a free one: see addresses(). There is no
-  // encryption and no authentication: hosts other than this machine's loopback (127.*, localhost, [::1]) are refused
-  // unless `insecure`.
+  // Where to listen: "unix:PATH" or "HOST:PORT", one or more. Port 0 takes a free one: see addresses(). Hosts other than
+  // this machine's loopback (127.*, localhost, [::1]) are refused without TLS, unless `insecure`.
   std::vector<std::string> listen;
   bool insecure = false;
+  // TLS 1.2 or later for every HOST:PORT: PEM files of a certificate with those that signed it, and of its key. With
+  // `tls_client_ca`, clients must have a certificate that one of its authorities signed. The files are read again within
+  // a second of a change; replace them by renaming.
+  std::string tls_certificate, tls_key, tls_client_ca;
+  // Each call must carry one of this file's tokens, as the metadata "authorization: Bearer TOKEN", else it gets
+  // UNAUTHENTICATED: a token a line, 16 visible characters at least, # for comments. Read again as above. Health checks
+  // and reflection need none.
+  std::string token_file;
   // Permissions of Unix sockets. Who may write to the socket may call.
   unsigned unix_mode = 0600;
   // Threads that compute; 0: as many as the machine has.

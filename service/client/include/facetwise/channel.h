@@ -1,0 +1,27 @@
+// A connection to one server, for the calls that are none of the engine's: Info and Benchmark.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "facetwise/client.h"
+#include "grpcpp/grpcpp.h"
+
+namespace facetwise {
+
+struct Channel {
+  std::string address;
+  std::shared_ptr<grpc::Channel> channel;
+  std::string authorization;  // "Bearer TOKEN", or empty
+
+  // Call it on the context of each call.
+  void authorise(grpc::ClientContext& context) const {
+    if (!authorization.empty()) context.AddMetadata("authorization", authorization);
+  }
+};
+
+// Begins to connect; does not wait. InvalidArgument and NotFound as connect().
+absl::StatusOr<Channel> open_channel(const std::string& address, const ConnectOptions& options);
+
+}  // namespace facetwise
