@@ -227,34 +227,64 @@ TEST_F(Lifetime, CallsThatSendNothingAreEnded) {
   }
 }
 
-// A deadline ends the work too: the server's thread is free again long before the call would have been done.
-TEST_F(Lifetime, DeadlinesStopTheWork) {
+// One value for all columns: a small request for much work, some ten nanoseconds a lane.
+v1::BatchRequest slow_request(std::size_t lanes) {
+  v1::BatchRequest slow = good_request(1);
+  slow.mutable_model()->set_distribution(v1::BECKMANN);
+  slow.set_sampler(v1::VISIBLE);
+  slow.set_lanes(lanes);
+  slow.clear_outputs();
+  slow.add_outputs(v1::STATUS);
+  return slow;
+}
+
+// Calls compute in turns.
+TEST_F(Lifetime, AShortCallDoesNotWaitForALongOne) {
   ServerProcess server({"--listen", unix_address(), "--threads", "1", "--max-message-bytes", "1000000000",
                         "--max-bytes-in-flight", "4000000000"});
   ASSERT_TRUE(server.ready());
   const auto stub = stub_of(unix_address());
-  // One value for all columns: a small request for seconds of work.
-  v1::BatchRequest slow = good_request(1);
-  slow.mutable_model()->set_distribution(v1::BECKMANN);
-  slow.set_sampler(v1::VISIBLE);
-  slow.set_lanes(200000000);
-  slow.clear_outputs();
-  slow.add_outputs(v1::STATUS);
-  const auto begun = Clock::now();
+  std::atomic<bool> done{false};
+  std::thread long_call([&] {
+    EXPECT_TRUE(run_request(*stub, slow_request(200000000)).ok());
+    done = true;
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  for (int n = 0; n < 3; ++n) {
+    EXPECT_TRUE(run(*stub, 1000).ok());
+    EXPECT_TRUE(run(*stub, 50000).ok());  // long too, but much shorter
+  }
+  EXPECT_FALSE(done);
+  long_call.join();
+}
+
+// A deadline ends the work too: the server has drained long before the call would have been done.
+TEST_F(Lifetime, DeadlinesStopTheWork) {
+  const std::vector<std::string> arguments = {
+      "--listen",   unix_address(),          "--threads", "1", "--max-message-bytes",
+      "1000000000", "--max-bytes-in-flight", "4000000000"};
+  const auto stub = stub_of(unix_address());
+  Clock::duration stopped;
   {
+    ServerProcess server(arguments);
+    ASSERT_TRUE(server.ready());
+    const auto begun = Clock::now();
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(300));
     v1::BatchResponse response;
-    EXPECT_EQ(stub->Run(&context, slow, &response).error_code(), StatusCode::DEADLINE_EXCEEDED);
+    EXPECT_EQ(stub->Run(&context, slow_request(200000000), &response).error_code(), StatusCode::DEADLINE_EXCEEDED);
+    EXPECT_TRUE(run(*stub, 3).ok());
+    server.signal(SIGTERM);
+    EXPECT_EQ(server.wait(), 0);
+    stopped = Clock::now() - begun;
   }
-  // The only thread answers again.
-  EXPECT_TRUE(run(*stub, 3).ok());
-  const auto stopped = Clock::now() - begun;
   // How long it is without a deadline, by a twentieth of it.
-  slow.set_lanes(10000000);
+  ServerProcess server(arguments);
+  ASSERT_TRUE(server.ready());
+  const auto again_stub = stub_of(unix_address());
   const auto again = Clock::now();
-  EXPECT_TRUE(run_request(*stub, slow).ok());
-  EXPECT_LT(stopped, std::chrono::milliseconds(300) + 10 * (Clock::now() - again));
+  EXPECT_TRUE(run_request(*again_stub, slow_request(10000000)).ok());
+  EXPECT_LT(stopped, std::chrono::milliseconds(1000) + 10 * (Clock::now() - again));
 }
 
 TEST_F(Lifetime, OutlivesClientsThatGoAway) {

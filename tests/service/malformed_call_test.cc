@@ -6,7 +6,6 @@
 #include "calls.h"
 #include "facetwise/engine.h"
 #include "grpcpp/generic/generic_stub.h"
-#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "server_process.h"
 

@@ -220,6 +220,18 @@ TEST_F(Remote, GivesTheSameBytesOverTcpAndFromSeveralServers) {
   compare(*three, {.lanes = 50021, .active = true, .random = Random::generator});
 }
 
+// A server computes large messages a piece at a time: larger ones while no other call computes, one after the other and
+// several at once.
+TEST_F(Remote, GivesTheSameBytesWhereServersCutMessages) {
+  ServerProcess server({"--listen", "unix:" + folder_.path("s"), "--max-message-bytes", "67108864"});
+  ASSERT_TRUE(server.ready());
+  const auto alone = connect_to(server.addresses(), std::size_t{60} << 20, 1);
+  const auto several = connect_to(server.addresses(), std::size_t{3} << 20, 4);
+  ASSERT_TRUE(alone && several);
+  compare(*alone, {.lanes = 300007, .broadcast = true, .random = Random::generator});
+  compare(*several, {.lanes = 300007, .random = Random::generator_ids});
+}
+
 // A piece is one lane where that is all that fits, and never above the server's limit.
 TEST_F(Remote, PiecesRespectTheServersLimit) {
   ServerProcess server({"--listen", "unix:" + folder_.path("s"), "--max-message-bytes", "8192"});

@@ -327,6 +327,27 @@ class Response {
   std::size_t lanes_;
 };
 
+// Some lanes of a batch whose columns are contiguous.
+Batch piece(const Batch& batch, std::size_t begin, std::size_t end) {
+  if (end - begin == batch.lanes) return batch;
+  Batch some = batch;
+  some.lanes = end - begin;
+  const auto cut = [&](auto& column) {
+    if (column.present() && !column.one_value()) column = {column.data() + begin, some.lanes};
+  };
+  for (const InputField& field : input_fields()) cut(field.column(some));
+  const auto cut_output = [&](auto& column) {
+    if (column.present()) column = {column.data() + begin, some.lanes};
+  };
+  for (const OutputField& field : output_fields()) cut_output(field.column(some));
+  for (const ByteField& field : byte_fields()) cut_output(field.column(some));
+  if (some.generator) {
+    some.generator->first_id += begin;
+    cut(some.generator->id);
+  }
+  return some;
+}
+
 }  // namespace
 
 absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const CallTools& tools) {
@@ -345,13 +366,21 @@ absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const C
                                                    ": send fewer lanes"));
   if (auto status = tools.ticket.hold(response.bytes()); !status.ok()) return status;
   wire::MessageWriter writer = response.make(batch);
+  // As a whole: what is wrong with a piece would be told with the piece's sizes.
+  if (auto status = check(decoder.operation(), batch); !status.ok()) return status;
   // Shorter calls are done before anybody could stop them.
   constexpr std::size_t kLong = std::size_t{1} << 18;
   std::optional<Watch::Computing> computing;
   if (batch.lanes >= kLong) computing.emplace(tools.watch, tools.context);
-  const auto statistics = tools.compute.run(tools.admission.calls(), [&](Execution execution) {
+  absl::StatusOr<Statistics> statistics = Statistics{};
+  tools.compute.each(batch.lanes, [&](std::size_t begin, std::size_t end, Execution execution) {
     if (computing) execution.stop = &computing->stop();
-    return run(decoder.operation(), batch, execution);
+    const auto some = run(decoder.operation(), piece(batch, begin, end), execution);
+    if (some.ok())
+      *statistics += *some;
+    else
+      statistics = some.status();
+    return some.ok();
   });
   if (!statistics.ok()) return statistics.status();
 

@@ -126,8 +126,11 @@ absl::StatusOr<grpc::ByteBuffer> answer_compact(grpc::ByteBuffer& request, const
   for (std::size_t k = 1; k < columns; ++k)
     dense.push_back({decoded.columns[k - 1], {reinterpret_cast<float*>(values(k)), decoded.lanes}});
   compaction.columns = dense;
-  const auto accepted = tools.compute.run(tools.admission.calls(),
-                                          [&](const Execution& execution) { return compact(compaction, execution); });
+  absl::StatusOr<std::size_t> accepted;
+  tools.compute.each(0, [&](std::size_t, std::size_t, const Execution& execution) {
+    accepted = compact(compaction, execution);
+    return true;
+  });
   if (!accepted.ok()) return accepted.status();
 
   v1::CompactResponse small;
