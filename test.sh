@@ -5,13 +5,15 @@ cd "$(dirname "$0")"
 
 usage() {
   cat <<'EOF'
-Usage: ./test.sh [--quick | --long] [--help]
+Usage: ./test.sh [--quick | --long | --sanitize] [--help]
 
 On a Debian 12 machine: installs the packages that are missing, builds the presets `test` (everything,
 build/release) and `arm64` (the library, build/arm64), and runs all tests in one CTest run; those built
 for arm64 run under qemu-aarch64 and are named arm64.*.
 
   --quick  only the native tests: nothing is built for arm64 or emulated
+  --sanitize  instead, the engine's and the service's tests with smaller counts, built twice: with AddressSanitizer and
+           UndefinedBehaviorSanitizer (build/sanitize), and with ThreadSanitizer (build/sanitize-threads)
   --long   also the tests that take long: the power of the chi-square test at 10^8 samples, and the like
 
 Exit code: 0 if every test passed. CTest's own report is the end of the output.
@@ -20,10 +22,12 @@ EOF
 
 long=
 quick=
+sanitize=
 for argument in "$@"; do
   case "$argument" in
     --quick) quick=1 ;;
     --long) long=1 ;;
+    --sanitize) sanitize=1 ;;
     -h | --help) usage; exit 0 ;;
     *) echo "test.sh: unknown argument \"$argument\"" >&2; usage >&2; exit 2 ;;
   esac
@@ -43,6 +47,18 @@ logged() {
 
 echo "packages"
 logged install-test cmake/install.sh test
+if [ -n "$sanitize" ]; then
+  # Libraries that are not instrumented synchronise by means that the sanitizer does not see.
+  export TSAN_OPTIONS="suppressions=$PWD/tests/thread_sanitizer.txt ${TSAN_OPTIONS:-}"
+  failed=0
+  for preset in sanitize sanitize-threads; do
+    echo "build (build/$preset)"
+    logged "configure-$preset" cmake --preset "$preset"
+    logged "build-$preset" cmake --build "build/$preset" --target sanitized_tests
+    ctest --test-dir "build/$preset" --output-on-failure -j2 -L 'determinism|faults|table|fuzz|service' || failed=1
+  done
+  exit "$failed"
+fi
 emulated=
 if [ -z "$quick" ]; then
   # arm64 first: the native build includes its tests.

@@ -7,8 +7,10 @@
 #include <limits>
 #include <mutex>
 #include <set>
+#include <stdexcept>
 
 #include "facetwise/albedo_table.h"
+#include "facetwise/slope_table.h"
 
 namespace facetwise::test {
 namespace {
@@ -74,11 +76,18 @@ bool is_plain(const Call& call) {
          !call.model.retro && call.model.compensation == Compensation::none && !call.moments;
 }
 
+namespace {
+
+// Symmetric about n are all but some tables.
+bool is_skewed(const Model& model) { return model.table != nullptr && !model.table->radial(); }
+
+}  // namespace
+
 bool reads(const Call& call, const InputField& field) {
   if (!(field.operations & bit(call.operation))) return false;
   if (field.name == "eta") return call.model.interface == Interface::dielectric;
   if (field.name == "f0" || field.name == "f90") return call.model.interface == Interface::schlick;
-  if (field.name == "slope_correlation") return call.moments;
+  if (field.name == "slope_correlation") return call.moments && !is_skewed(call.model);
   // What Raab's back-vector does needs slopes that are symmetric about n.
   if (field.name.starts_with("mean_slope")) return call.moments && !call.model.retro;
   return true;
@@ -97,7 +106,7 @@ std::string call_name(const Call& call) {
   const Model& model = call.model;
   if (model.distribution != Distribution::ggx || model.masking != Masking::smith) {
     append(model.distribution);
-    text.append("-").append(name(model.masking));
+    text.append(is_skewed(model) ? "-skewed-" : "-").append(name(model.masking));
   }
   if (has_sampler(call.operation) && !call.values_alone) append(call.sampler);
   if (call.shadowing == Shadowing::uncorrelated) append(call.shadowing);
@@ -138,7 +147,7 @@ void vary(Call& call, std::size_t turn) {
   if (turn % 3 == 1) call.shadowing = Shadowing::uncorrelated;
   if (turn % 4 == 1) call.model.normalisation = Normalisation::biased;
   if (turn % 4 == 2) call.model.transport = Transport::importance;
-  if (turn % 5 == 3) call.model.retro = true;
+  if (turn % 5 == 3 && !is_skewed(call.model)) call.model.retro = true;
   if (call.operation >= Operation::sample_transmission) return;
   if (turn % 2 == 1) call.model.interface = turn % 4 == 1 ? Interface::schlick : Interface::dielectric;
 }
@@ -204,15 +213,40 @@ std::vector<Call> plain_calls() {
 
 namespace {
 
+// Committed, since another machine's sine may make other tables: of SlopeTable::build() with few nodes.
+std::shared_ptr<const SlopeTable> committed_table(const char* file) {
+  auto table = SlopeTable::load(std::string(FACETWISE_TEST_TABLES) + file);
+  if (!table.ok()) throw std::runtime_error(std::string(table.status().message()));
+  return *std::move(table);
+}
+
+// Those of a radial and of a skewed table.
+std::vector<Model> tabulated_models() {
+  std::vector<Model> models;
+  for (const char* file : {"/radial.slopes", "/skewed.slopes"})
+    for (const Model& model : all_models(committed_table(file)))
+      if (model.distribution == Distribution::table) models.push_back(model);
+  return models;
+}
+
 std::vector<Call> make_all_calls() {
   std::vector<Call> calls;
   add_plain(calls);
   std::set<std::string> names;
   for (const Call& call : calls) names.insert(call_name(call));
-  for (const Model& model : all_models()) add_model(model, false, calls, names);
-  for (const Model& model : all_models())
-    if (takes_slopes(model)) add_model(model, true, calls, names);
-  for (const Model& model : all_models()) add_compensated(model, calls);
+  std::size_t closed = 0;
+  for (const auto& models : {all_models(), tabulated_models()}) {
+    for (const Model& model : models) add_model(model, false, calls, names);
+    for (const Model& model : models)
+      if (takes_slopes(model)) add_model(model, true, calls, names);
+    for (const Model& model : models)
+      if (!is_skewed(model)) add_compensated(model, calls);
+    if (closed == 0) closed = calls.size();
+  }
+  // Tests go through each of these; what else a table can be they share with the others.
+  std::size_t few = closed;
+  for (std::size_t k = closed; k < calls.size(); k += 3) calls[few++] = calls[k];
+  calls.resize(few);
 #ifdef FACETWISE_QUICK
   // For an emulator: all of plain GGX, and of the models every seventh.
   const std::size_t plain = plain_calls().size();

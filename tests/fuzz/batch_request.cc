@@ -1,0 +1,7 @@
+// A BatchRequest from a stranger, from its bytes to the answer's.
+#include "tests/fuzz/server_call.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  facetwise::fuzz::answer(facetwise::answer_batch, data, size);
+  return 0;
+}

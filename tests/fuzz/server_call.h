@@ -1,0 +1,57 @@
+// Answers one message as the server does, within small limits.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+
+#include "facetwise/albedo_table.h"
+#include "facetwise/batch.h"
+#include "grpcpp/server_context.h"
+#include "src/call.h"
+
+namespace facetwise::fuzz {
+
+inline constexpr std::size_t kMessageBytes = std::size_t{1} << 16;
+
+// Small tables of albedo, which else take seconds each.
+inline void make_albedo_tables() {
+  for (Model model : all_models())
+    for (const Shadowing shadowing : {Shadowing::correlated, Shadowing::uncorrelated}) {
+      model.shadowing = shadowing;
+      AlbedoTable::Options options;
+      options.sizes = {2, 2, 2, 2, 2, 2};
+      options.samples = 2;
+      if (auto table = AlbedoTable::build(model, options); table.ok()) use_albedo_table(*table);
+    }
+}
+
+template <class Answer>
+void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
+  static Compute compute(1, {});
+  static Watch watch;
+  static Admission admission(8, 64 * kMessageBytes);
+  static const bool ready = [] {
+    make_albedo_tables();
+    return true;
+  }();
+  if (!ready || size > kMessageBytes) return;
+  // In slices of uneven sizes, as they come from a network.
+  std::vector<grpc::Slice> slices;
+  for (std::size_t begin = 0, length = 1; begin < size; begin += length, length = length * 5 % 1021 + 1) {
+    length = std::min(length, size - begin);
+    slices.emplace_back(data + begin, length);
+  }
+  grpc::ByteBuffer request(slices.data(), slices.size());
+  grpc::ServerContext context;
+  Admission::Ticket ticket(admission);
+  const auto answered = answer(request, CallTools{{kMessageBytes}, compute, admission, ticket, watch, context});
+  // What is too much or malformed is refused; nothing else goes wrong.
+  if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&
+      answered.status().code() != absl::StatusCode::kResourceExhausted &&
+      answered.status().code() != absl::StatusCode::kUnimplemented)
+    std::abort();
+  if (answered.ok() && answered->Length() > 2 * kMessageBytes) std::abort();
+}
+
+}  // namespace facetwise::fuzz
