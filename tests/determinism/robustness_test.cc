@@ -170,9 +170,15 @@ TEST_P(Robustness, EdgesOfEveryInput) {
           for (const float u2 : us) {
             const float u3 = us[lanes.count % us.size()];
             const float values[] = {i[0], i[1], i[2], ax, ay, o[0], o[1], o[2], u1, u2, u3};
-            for (std::size_t k = 0; k < lanes.in.size(); ++k) lanes.in[k].push_back(values[k]);
+            static_assert(std::size(values) == std::size(input::kPlain));
+            for (std::size_t k = 0; k < std::size(values); ++k) lanes.in[input::kPlain[k]].push_back(values[k]);
             ++lanes.count;
           }
+  // What only some models have.
+  for (const auto& [column, value] : {std::pair{input::mean_slope_x, 0.1f}, std::pair{input::mean_slope_y, -0.2f},
+                                      std::pair{input::slope_correlation, 0.3f}, std::pair{input::eta, 1.5f},
+                                      std::pair{input::f0, 0.04f}, std::pair{input::f90, 1.0f}})
+    lanes.in[column].assign(lanes.count, value);
   check(lanes);
 }
 
