@@ -171,6 +171,7 @@ TEST_P(ModelAccuracy, AWrongRoughnessIsNoticed) {
   };
   std::size_t noticed = 0, compared = 0;
   for (std::size_t n = 0; n < points.size(); ++n) {
+    if (weighs_behind(c.model, points[n])) continue;  // HitsOfPhong has those
     double at[kPointFloats];
     const auto* in = reinterpret_cast<const float*>(&points[n]);
     std::copy(in, in + kPointFloats, at);

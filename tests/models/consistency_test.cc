@@ -72,6 +72,8 @@ TEST_P(ModelConsistency, SamplesAgreeWithQueries) {
       if (from.z + o.z <= 4 * kUnit || o.z <= 4 * kUnit) continue;
       if (std::hypot(from.x + o.x, from.y + o.y, from.z + o.z) < 1e-3) continue;
       if (sample.pdf < 1e-15 || sample.pdf > 1e30) continue;
+      // The reference's quadrature takes long there, and an emulator a second.
+      if (weighs_behind(c.model, points[n]) && (kQuick || n % 16 != 0)) continue;
       const Vector m = unit({from.x + o.x, from.y + o.y, from.z + o.z});
       const HalfVector half = half_vector(c, points[n], from, m);
       const double moves = change(c, points[n], o) * (1 + half.turn) + half.im;
