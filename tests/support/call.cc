@@ -248,10 +248,15 @@ std::vector<Call> make_all_calls() {
   for (std::size_t k = closed; k < calls.size(); k += 3) calls[few++] = calls[k];
   calls.resize(few);
 #ifdef FACETWISE_QUICK
-  // For an emulator: all of plain GGX, and of the models every seventh.
+  // For an emulator: all of plain GGX, and of the models every seventh; but of Phong's, which take it seconds each, one.
   const std::size_t plain = plain_calls().size();
   std::size_t kept = plain;
-  for (std::size_t k = plain; k < calls.size(); k += 7) calls[kept++] = calls[k];
+  bool has_phong = false;
+  for (std::size_t k = plain; k < calls.size(); k += 7) {
+    const bool phong = calls[k].model.distribution == Distribution::phong;
+    if (!phong || !has_phong) calls[kept++] = calls[k];
+    has_phong |= phong;
+  }
   calls.resize(kept);
 #endif
   return calls;
