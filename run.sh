@@ -93,4 +93,4 @@ echo
 "$facetwise" summary --report out/report.json --verification out/verify.json
 echo
 echo "Look at it: out/report.html. Results: out/report.json, out/verify.json. Full tables: out/bench.log."
-echo "The experiments' claims, measured: out/experiments.log; in full: facetwise experiment (about half an hour)."
+echo "The experiments' claims, measured: out/experiments.log; in full: facetwise experiment (about 40 minutes)."
