@@ -77,12 +77,9 @@ absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const C
   };
   const auto channel = open_channel(address, options);
   if (!channel.ok()) return channel.status();
-  const auto stub = v1::Sampler::NewStub(channel->channel);
-  grpc::ClientContext info_context;
-  channel->authorise(info_context);
-  info_context.set_deadline(std::chrono::system_clock::now() + kPatience);
   v1::InfoResponse info;
-  if (const auto status = stub->Info(&info_context, {}, &info); !status.ok()) return failed(status);
+  if (const auto status = ask_info(*channel, std::chrono::system_clock::now() + kPatience, false, info); !status.ok())
+    return failed(status);
   BenchReport report;
   report.version = info.version();
   report.machine = {info.cpu(), info.threads(), info.target()};
@@ -93,6 +90,7 @@ absl::StatusOr<BenchReport> benchmark_server(const std::string& address, const C
   v1::BenchmarkRequest request;
   request.set_filter(filter);
   request.set_min_seconds(min_seconds);
+  const auto stub = v1::Sampler::NewStub(channel->channel);
   const auto reader = stub->Benchmark(&context, request);
   for (v1::BenchmarkProgress message; reader->Read(&message);) {
     BenchProgress now{.done = message.done(), .total = message.total(), .result = nullptr, .part = "throughput"};

@@ -1,7 +1,6 @@
 // info: what this program, this machine or a server is.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <grpcpp/grpcpp.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -14,7 +13,7 @@
 #include "app/verbs.h"
 #include "bench/machine.h"
 #include "facetwise/channel.h"
-#include "facetwise/v1/sampler.grpc.pb.h"
+#include "facetwise/v1/sampler.pb.h"
 
 namespace facetwise::app {
 namespace {
@@ -39,12 +38,8 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
   constexpr std::chrono::seconds kPatience{5};
   const auto channel = open_channel(address, options);
   if (!channel.ok()) return channel.status();
-  const auto stub = v1::Sampler::NewStub(channel->channel);
-  grpc::ClientContext context;
-  channel->authorise(context);
-  context.set_deadline(std::chrono::system_clock::now() + kPatience);
   v1::InfoResponse info;
-  const grpc::Status status = stub->Info(&context, {}, &info);
+  const grpc::Status status = ask_info(*channel, std::chrono::system_clock::now() + kPatience, false, info);
   if (!status.ok()) return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
   Json targets = Json::array();
   for (const std::string& target : info.available_targets()) targets.push_back(target);

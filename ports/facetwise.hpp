@@ -96,9 +96,9 @@ inline void bound(Vec3 i, const Stretched& w, float ax, float ay, float& t, floa
 }
 
 // The elliptic cone of the normals m_hat whose reflection is not occluded, i_z > 0:
-//   |q|^2-weighted quadric with one positive eigenvalue lambda, the root of
-//   lambda - i_z = w_x^2 / (lambda + i_z ax^2) + w_y^2 / (lambda + i_z ay^2);
-// axis (v_x, v_y, 1).
+// o_z > 0 is a quadratic form in m_hat with one positive eigenvalue lambda, the root of
+//   lambda - i_z = w_x^2 / (lambda + i_z ax^2) + w_y^2 / (lambda + i_z ay^2),
+// whose eigenvector is the axis (v_x, v_y, 1).
 struct Cone {
   float lambda, px, py, p, q, vx, vy, n2, two_k;
 };

@@ -45,7 +45,7 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   grpc::ByteBuffer request(slices.data(), slices.size());
   grpc::ServerContext context;
   Admission::Ticket ticket(admission);
-  const auto answered = answer(request, CallTools{{kMessageBytes}, compute, admission, ticket, watch, context});
+  const auto answered = answer(request, CallTools{{kMessageBytes}, compute, ticket, watch, context});
   // What is too much or malformed is refused; nothing else goes wrong.
   if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&
       answered.status().code() != absl::StatusCode::kResourceExhausted &&

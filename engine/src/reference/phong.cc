@@ -1,4 +1,4 @@
-// Phong with V-cavity from behind: docs/models.md, "Behind, V-cavity".
+// Phong with V-cavity from behind: docs/models.md, "V-cavity".
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -53,8 +53,8 @@ Scaled phong_hits(const Surface& surface, Vector i) {
   return last.hits;
 }
 
-// An azimuth psi, tan(theta) = b tan(psi) with theta's density ~ min(cos(theta) / g, 1), then a slope there that faces i: the share s of those that
-// are nearer has the density min(s / c, 1) / (1 - c / 2).
+// An azimuth psi, tan(theta) = b tan(psi) with theta's density ~ min(cos(theta) / g, 1), then a slope there that faces i:
+// the share s of those that are nearer has the density min(s / c, 1) / (1 - c / 2).
 Scaled phong_behind(const Surface& surface, Vector i, Vector m, Real im) {
   const Stretched w = stretched(surface, i);
   const Real k = -w.z / std::hypot(w.x, w.y), b = std::sqrt(1 + 2 * k * k);

@@ -1,6 +1,7 @@
 #include "facetwise/channel.h"
 
 #include "absl/strings/str_cat.h"
+#include "facetwise/v1/sampler.grpc.pb.h"
 #include "wire/keep_grpc.h"
 #include "wire/text_file.h"
 
@@ -81,6 +82,15 @@ absl::StatusOr<Channel> open_channel(const std::string& address, const ConnectOp
   opened.channel = grpc::CreateCustomChannel(address, *credentials, channel_arguments(address, options));
   opened.channel->GetState(true);  // begins to connect
   return opened;
+}
+
+grpc::Status ask_info(const Channel& channel, std::chrono::system_clock::time_point until, bool waits,
+                      v1::InfoResponse& info) {
+  grpc::ClientContext context;
+  channel.authorise(context);
+  context.set_deadline(until);
+  context.set_wait_for_ready(waits);
+  return v1::Sampler::NewStub(channel.channel)->Info(&context, {}, &info);
 }
 
 }  // namespace facetwise

@@ -1,6 +1,6 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/client.h"
-#include "facetwise/v1/sampler.grpc.pb.h"
+#include "facetwise/v1/sampler.pb.h"
 #include "src/pieces.h"
 #include "src/pipeline.h"
 #include "wire/status.h"
@@ -50,11 +50,9 @@ class RemoteEngine final : public Engine {
 
 // Why a server does not answer that was not waited for: gRPC tells only then.
 std::string reason(const Channel& channel) {
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
-  channel.authorise(context);
   v1::InfoResponse info;
-  const grpc::Status status = v1::Sampler::NewStub(channel.channel)->Info(&context, {}, &info);
+  const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(500);
+  const grpc::Status status = ask_info(channel, until, false, info);
   return status.error_code() == grpc::StatusCode::UNAVAILABLE ? absl::StrCat(" (", status.error_message(), ")") : "";
 }
 
@@ -74,12 +72,8 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
   std::size_t message_bytes = std::size_t{1} << 30;
   const auto until = std::chrono::system_clock::now() + options.connect_timeout;
   for (const auto& [channel, stub] : connections) {
-    grpc::ClientContext context;
-    channel.authorise(context);
-    context.set_deadline(until);
-    context.set_wait_for_ready(true);
     v1::InfoResponse info;
-    const grpc::Status status = v1::Sampler::NewStub(channel.channel)->Info(&context, {}, &info);
+    const grpc::Status status = ask_info(channel, until, true, info);
     if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
       return absl::UnavailableError(absl::StrCat("server ", channel.address, ": no answer within ",
                                                  options.connect_timeout.count(), " ms: is it started?",

@@ -25,7 +25,6 @@ inline constexpr std::size_t kMostCompactColumns = 64;
 struct CallTools {
   Limits limits;
   Compute& compute;
-  Admission& admission;
   Admission::Ticket& ticket;
   Watch& watch;
   grpc::ServerContext& context;

@@ -66,7 +66,7 @@ grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& cont
       return error(grpc::StatusCode::INVALID_ARGUMENT, "message: more than one, in a call that takes one");
     if (context.IsCancelled()) return grpc::Status::CANCELLED;
   }
-  auto answered = answer(request, {limits_, compute_, admission_, ticket, watch_, context});
+  auto answered = answer(request, {limits_, compute_, ticket, watch_, context});
   if (!answered.ok()) return to_grpc(answered.status());
   stream.WriteLast(*answered, {});
   return grpc::Status::OK;
@@ -82,7 +82,7 @@ grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& con
       if (!stream.Read(&request)) return context.IsCancelled() ? grpc::Status::CANCELLED : grpc::Status::OK;
     }
     if (context.IsCancelled()) return grpc::Status::CANCELLED;
-    auto answered = answer(request, {limits_, compute_, admission_, ticket, watch_, context});
+    auto answered = answer(request, {limits_, compute_, ticket, watch_, context});
     if (!answered.ok()) return to_grpc(answered.status());
     if (!stream.Write(*answered)) return grpc::Status::CANCELLED;  // the client has gone
     ticket.release();

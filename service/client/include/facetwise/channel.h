@@ -1,6 +1,7 @@
 // A connection to one server, for the calls that are none of the engine's: Info and Benchmark.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -9,6 +10,10 @@
 #include "grpcpp/grpcpp.h"
 
 namespace facetwise {
+
+namespace v1 {
+class InfoResponse;
+}
 
 struct Channel {
   std::string address;
@@ -23,5 +28,10 @@ struct Channel {
 
 // Begins to connect; does not wait. InvalidArgument and NotFound as connect().
 absl::StatusOr<Channel> open_channel(const std::string& address, const ConnectOptions& options);
+
+// What the server says of itself, until the time given. With `waits` a server that is not there yet is waited for; without,
+// the status says why there is no connection.
+grpc::Status ask_info(const Channel& channel, std::chrono::system_clock::time_point until, bool waits,
+                      v1::InfoResponse& info);
 
 }  // namespace facetwise
