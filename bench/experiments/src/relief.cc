@@ -124,13 +124,13 @@ absl::StatusOr<Page> relief_page(const Options& options) {
   if (auto status = steps.begin("geometry", 10, 2); !status.ok()) return status;
   scene->mesh = lying(render::relief(side, heights, *slopes, 0));
   const std::size_t triangles = scene->mesh.triangles.size();
-  const std::uint32_t many = by_size(options, 512u, 4096u, 16384u);
+  const std::uint32_t many = by_size(options, 512u, 8192u, 16384u);
   const auto truth = reference(*scene, settings, many, steps);
   if (!truth.ok()) return truth.status();
 
   scene->mesh = flat;
   material.slopes = slopes;
-  settings.samples = by_size(options, 128u, 1024u, 4096u);
+  settings.samples = by_size(options, many / 4, many / 256, many / 256);
   if (auto status = steps.begin("moments of slopes", 4); !status.ok()) return status;
   auto leadr = render_here(*scene, settings, steps);
   if (!leadr.ok()) return leadr.status();
