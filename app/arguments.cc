@@ -51,7 +51,7 @@ void ModelArguments::add(CLI::App& app) {
   add_named(app, "--compensation", model.compensation, parse_compensation,
             "What is added for light that is scattered more than once, to weights and values; default none. Its table "
             "takes seconds on first use",
-            "none|turquin");
+            "none|turquin|kelemen");
   app.add_flag("--retro", model.retro, "Reflect back to where the light comes from");
 }
 

@@ -23,7 +23,7 @@ absl::StatusOr<Statistics> run(Operation operation, const Batch& batch, const Ex
   plan.stop = execution.stop;
   plan.compensated = compensated_output(operation, batch.model, columns);
   std::shared_ptr<const AlbedoTable> albedo;
-  if (operation == Operation::albedo || plan.compensated != kOutputs) {
+  if (operation == Operation::albedo || has_lobe(operation, batch.model) || plan.compensated != kOutputs) {
     auto table = albedo_table(batch.model);
     if (!table.ok()) return table.status();
     albedo = *std::move(table);

@@ -69,8 +69,7 @@ Sampler sampler_of(Operation operation, const Batch& batch) {
 
 Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine,
                    bool ahead) {
-  const SurfaceKernels& surface =
-      surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine);
+  const SurfaceKernels& surface = find_surface(table, model, affine);
   const auto index = static_cast<std::size_t>(sampler);
   switch (operation) {
     case Operation::sample_normal: return samples_normals(sampler) ? surface.sample[index] : nullptr;
@@ -88,9 +87,8 @@ Kernel find_kernel(const TargetKernels& table, Operation operation, const Model&
   return nullptr;
 }
 
-Kernel find_compensation(const TargetKernels& table, const Model& model, bool affine) {
-  return surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine)
-      .compensation;
+const SurfaceKernels& find_surface(const TargetKernels& table, const Model& model, bool affine) {
+  return surface_of(*table.distribution[static_cast<std::size_t>(model.distribution)], model.masking, affine);
 }
 
 std::vector<Sampler> samplers_for(Operation operation, const Model& model) {
@@ -131,7 +129,7 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
   if (model.normalisation > Normalisation::biased) return invalid("model.normalisation", "unknown value");
   if (model.interface > Interface::dielectric) return invalid("model.interface", "unknown value");
   if (model.transport > Transport::importance) return invalid("model.transport", "unknown value");
-  if (model.compensation > Compensation::turquin) return invalid("model.compensation", "unknown value");
+  if (model.compensation > Compensation::kelemen) return invalid("model.compensation", "unknown value");
   if (batch.sampler > Sampler::visible) return invalid("sampler", "unknown value");
 
   const DistributionKernels& distribution = kernels_of(model.distribution);

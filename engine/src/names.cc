@@ -28,7 +28,8 @@ constexpr Named<Normalisation> kNormalisations[] = {{Normalisation::unbiased, "u
 constexpr Named<Interface> kInterfaces[] = {
     {Interface::conductor, "conductor"}, {Interface::schlick, "schlick"}, {Interface::dielectric, "dielectric"}};
 constexpr Named<Transport> kTransports[] = {{Transport::radiance, "radiance"}, {Transport::importance, "importance"}};
-constexpr Named<Compensation> kCompensations[] = {{Compensation::none, "none"}, {Compensation::turquin, "turquin"}};
+constexpr Named<Compensation> kCompensations[] = {
+    {Compensation::none, "none"}, {Compensation::turquin, "turquin"}, {Compensation::kelemen, "kelemen"}};
 constexpr Named<Sampler> kSamplers[] = {{Sampler::ndf, "ndf"},     {Sampler::heitz, "heitz"},
                                         {Sampler::cap, "cap"},     {Sampler::bounded, "bounded"},
                                         {Sampler::exact, "exact"}, {Sampler::visible, "visible"}};
@@ -109,6 +110,7 @@ std::span<const Operation> all_operations() {
 bool samples_normals(Sampler sampler) { return sampler != Sampler::bounded && sampler != Sampler::exact; }
 
 bool uses_u3(const Model& model, Sampler sampler) {
+  if (model.compensation == Compensation::kelemen) return true;
   if (sampler == Sampler::exact) return model.distribution != Distribution::beckmann || model.masking != Masking::smith;
   if (sampler != Sampler::visible) return false;
   return model.masking == Masking::vcavity;

@@ -80,7 +80,8 @@ bool streams(const Plan& plan, bool spreads, const Execution& execution) {
 }  // namespace
 
 OutputIndex compensated_output(Operation operation, const Model& model, const PresentColumns& columns) {
-  if (operation == Operation::albedo || !reads_albedo(operation, model)) return kOutputs;
+  if (model.compensation != Compensation::turquin || !reads_albedo(operation, model)) return kOutputs;
+  if (operation == Operation::albedo) return kOutputs;
   const OutputIndex index = operation == Operation::sample_reflection ? kOutWeight : kOutValue;
   return columns.out_bits >> index & 1 ? index : kOutputs;
 }
@@ -136,11 +137,22 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
   if (known_to::kDielectric & bit(operation)) plan.constants.interface = model.interface;
   plan.constants.table = model.table ? &model.table->view() : nullptr;
   if (plan.compensated != kOutputs) {
-    plan.compensation = find_compensation(table, model, affine);
+    plan.compensation = find_surface(table, model, affine).compensation;
     plan.buffers = true;
   }
+  if (has_lobe(operation, model)) {
+    const SurfaceKernels& surface = find_surface(table, model, affine);
+    plan.lobe = surface.lobe;
+    plan.with_lobe = surface.with_lobe;
+    plan.buffers = true;
+    if (operation == Operation::sample_reflection) {
+      plan.lobe_query = find_kernel(table, Operation::evaluate_reflection, model, batch.sampler, affine);
+      plan.constants.draws_lobe = true;
+      plan.constants.wanted |= kWantsDirection | kWantsPdf | kWantsWeight;
+    }
+  }
 
-  if (plan.active || plan.positions < kLanesWorthHead) return;
+  if (plan.active || plan.lobe || plan.positions < kLanesWorthHead) return;
   plan.head = best_head(plan);
   if ((execution.stores == Stores::streaming || larger_than_caches(plan)) && share_a_set(plan)) {
     const Kernel ahead = find_kernel(table, operation, model, sampler_of(operation, batch), affine, true);

@@ -39,14 +39,18 @@ class Stage {
       if (whole) lanes -= lanes % kWidest;
       if (!whole) lanes = std::min(lanes, kStaged);
       tile_.lanes = lanes;
-      const bool in_place = whole && !plan_.active;
+      const bool in_place = whole && !plan_.active && !plan_.lobe;
       load(begin, in_place);
       if (plan_.generator) generate(begin);
       const bool staged = point_outputs(begin, in_place);
       if (plan_.ahead) point_ahead(begin, in_place);
-      if (plan_.compensation) compute_factors();
-      plan_.kernel(tile_, statistics);
-      if (plan_.compensation) apply_factors();
+      if (plan_.lobe) {
+        run_with_lobe(statistics);
+      } else {
+        if (plan_.compensation) compute_factors();
+        plan_.kernel(tile_, statistics);
+        if (plan_.compensation) apply_factors();
+      }
       if (staged) store(begin);
       begin += lanes;
     }
@@ -146,6 +150,55 @@ class Stage {
     for (std::size_t j = 0; j < tile_.lanes; ++j) out[j] = std::min(out[j] * factor_[j], kLargestDensity);
   }
 
+  // Kelemen's lobe beside the model's own. All columns are in buffers.
+  void run_with_lobe(Statistics& statistics) {
+    for (std::size_t k = 0; k < kLobeColumns; ++k) tile_.lobe[k] = lobe_[k];
+    tile_.status = bytes_[kOutStatus];
+    const bool draws = tile_.draws_lobe;
+    plan_.lobe(tile_, statistics);
+    Tile own = tile_;
+    if (draws) {
+      own.in[kU1] = lobe_[kLobeU1];
+      own.in[kU3] = lobe_[kLobeU3];
+      for (const OutputIndex k : {kOutOx, kOutOy, kOutOz, kOutPdf, kOutWeight}) own.out[k] = out_[k];
+    }
+    plan_.kernel(own, statistics);
+    take(draws, statistics);
+    if (draws) {
+      Tile query = own;
+      query.wanted = kWantsPdf | kWantsValue;
+      query.out[kOutPdf] = lobe_[kLobePdf];
+      query.out[kOutValue] = lobe_[kLobeValue];
+      query.status = nullptr;
+      const InputIndex in[] = {kOx, kOy, kOz};
+      const OutputIndex out[] = {kOutOx, kOutOy, kOutOz};
+      for (int c = 0; c < 3; ++c) query.in[in[c]] = own.in[in[c]] = out_[out[c]];
+      Statistics counted_by_the_sampler;
+      plan_.lobe_query(query, counted_by_the_sampler);
+    }
+    plan_.with_lobe(own, statistics);
+  }
+  // Which lanes have the lobe, and by which they are drawn. What the lobe draws is never occluded.
+  void take(bool draws, Statistics& statistics) {
+    float* const taken = lobe_[kLobeTaken];
+    std::uint8_t* const status = bytes_[kOutStatus];
+    constexpr auto kAccepted = static_cast<std::uint8_t>(LaneStatus::accepted);
+    constexpr auto kOccluded = static_cast<std::uint8_t>(LaneStatus::occluded);
+    for (std::size_t j = 0; j < tile_.lanes; ++j) {
+      if (!draws || taken[j] == 0 || status[j] > kOccluded) {
+        taken[j] = status[j] == kAccepted ? 1 : 0;
+        continue;
+      }
+      taken[j] = 2;
+      statistics.occluded -= status[j] == kOccluded ? 1 : 0;
+      status[j] = kAccepted;
+      out_[kOutOx][j] = lobe_[kLobeX][j];
+      out_[kOutOy][j] = lobe_[kLobeY][j];
+      out_[kOutOz][j] = lobe_[kLobeZ][j];
+    }
+    std::fill_n(taken + tile_.lanes, padding(), 0.0f);
+  }
+
   void store(std::size_t begin) {
     for (std::size_t c = 0; c < plan_.out_count; ++c) {
       const auto& [k, column, contiguous] = plan_.out[c];
@@ -168,6 +221,7 @@ class Stage {
   alignas(64) float in_[kInputs][kStaged];
   alignas(64) float out_[kOutputs][kStaged];
   alignas(64) float factor_[kStaged];
+  alignas(64) float lobe_[kLobeColumns][kStaged];
   alignas(64) std::uint8_t bytes_[kByteOutputs][kStaged];
   alignas(64) std::uint64_t id_[kStaged];
 };

@@ -21,6 +21,7 @@ inline constexpr std::size_t kLine = 16;
 
 // Bits of Tile::wanted and Tile::streamed.
 constexpr unsigned bit(OutputIndex output) { return 1u << output; }
+inline constexpr unsigned kWantsDirection = bit(kOutOx) | bit(kOutOy) | bit(kOutOz);
 inline constexpr unsigned kWantsNormal = bit(kOutMx) | bit(kOutMy) | bit(kOutMz) | bit(kOutIm);
 inline constexpr unsigned kWantsPdf = bit(kOutPdf), kWantsWeight = bit(kOutWeight), kWantsValue = bit(kOutValue),
                           kWantsShare = bit(kOutShare);
@@ -28,6 +29,21 @@ inline constexpr unsigned kWantsPdf = bit(kOutPdf), kWantsWeight = bit(kOutWeigh
 // The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and
 // written up to the next multiple of it.
 inline constexpr std::size_t kWidest = 32;
+
+// What the kernels of Kelemen's lobe pass on (kernels/kelemen-inl.h).
+enum LobeColumn {
+  kLobeShare,  // of the lobe in the drawing
+  kLobeScale,  // the lobe's value is this (1 - E(o)) o_z
+  kLobeTaken,
+  kLobeX,  // what it draws
+  kLobeY,
+  kLobeZ,
+  kLobeU1,  // what is left for the model's own sampler
+  kLobeU3,
+  kLobePdf,  // the model's own of what the lobe has drawn
+  kLobeValue,
+  kLobeColumns
+};
 
 // What is the same for every tile of a call, and too small to compile kernels apart for.
 struct TileConstants {
@@ -38,6 +54,7 @@ struct TileConstants {
   bool biased = false;         // Normalisation::biased
   bool importance = false;     // Transport::importance
   bool retro = false;
+  bool draws_lobe = false;  // sample_reflection with Kelemen's lobe
   Interface interface = Interface::conductor;
   const SlopeTableView* table = nullptr;
   const AlbedoTableView* albedo = nullptr;  // where it is read
@@ -53,6 +70,7 @@ struct Tile : TileConstants {
   const float* in[kInputs];             // those that the operation reads, the optional ones too
   float* out[kOutputs];                 // the wanted ones
   float* factor = nullptr;              // of compensation: what it computes
+  float* lobe[kLobeColumns];            // likewise
   std::size_t ahead_count = 0;          // for kernels that fetch ahead
   const float* const* ahead = nullptr;  // columns, as far ahead as each is fetched
 };
@@ -82,6 +100,7 @@ struct SurfaceKernels {
   Kernel masking = nullptr;
   Kernel albedo = nullptr;
   Kernel compensation = nullptr;
+  Kernel lobe = nullptr, with_lobe = nullptr;
 };
 
 // Those of a distribution. `affine` serves mean slopes and correlated roughness.
@@ -105,7 +124,7 @@ const TargetKernels& kernels(Target target, bool one_lane);
 // which fetches ahead, if there is one.
 Kernel find_kernel(const TargetKernels& table, Operation operation, const Model& model, Sampler sampler, bool affine,
                    bool ahead = false);
-// What computes a model's compensation into Tile::factor.
-Kernel find_compensation(const TargetKernels& table, const Model& model, bool affine);
+// The kernels of a model with its masking.
+const SurfaceKernels& find_surface(const TargetKernels& table, const Model& model, bool affine);
 
 }  // namespace facetwise

@@ -45,7 +45,7 @@ static_assert(v1::UNCORRELATED == static_cast<int>(Shadowing::uncorrelated) + 1)
 static_assert(v1::BIASED == static_cast<int>(Normalisation::biased) + 1);
 static_assert(v1::DIELECTRIC == static_cast<int>(Interface::dielectric) + 1);
 static_assert(v1::IMPORTANCE == static_cast<int>(Transport::importance) + 1);
-static_assert(v1::TURQUIN == static_cast<int>(Compensation::turquin) + 1);
+static_assert(v1::KELEMEN == static_cast<int>(Compensation::kelemen) + 1);
 static_assert(v1::NDF == static_cast<int>(Sampler::ndf) + 1);
 static_assert(v1::VISIBLE == static_cast<int>(Sampler::visible) + 1);
 // Those of a lane are the library's own.
@@ -102,7 +102,7 @@ std::optional<Transport> transport_from(int value) {
   return from(value, Transport::importance, std::optional(Transport::radiance));
 }
 std::optional<Compensation> compensation_from(int value) {
-  return from(value, Compensation::turquin, std::optional(Compensation::none));
+  return from(value, Compensation::kelemen, std::optional(Compensation::none));
 }
 std::optional<Sampler> sampler_from(int value, Sampler unspecified) {
   return from(value, Sampler::visible, std::optional(unspecified));

@@ -27,7 +27,7 @@ TEST(Names, RoundTrip) {
   expect_round_trip({Normalisation::unbiased, Normalisation::biased}, parse_normalisation);
   expect_round_trip({Interface::conductor, Interface::schlick, Interface::dielectric}, parse_interface);
   expect_round_trip({Transport::radiance, Transport::importance}, parse_transport);
-  expect_round_trip({Compensation::none, Compensation::turquin}, parse_compensation);
+  expect_round_trip({Compensation::none, Compensation::turquin, Compensation::kelemen}, parse_compensation);
   expect_round_trip({Sampler::ndf, Sampler::heitz, Sampler::cap, Sampler::bounded, Sampler::exact, Sampler::visible},
                     parse_sampler);
   expect_round_trip({Target::best, Target::scalar, Target::avx2, Target::avx3, Target::neon}, parse_target);

@@ -179,11 +179,14 @@ void expect_the_hemispheres_mean(const Model& model) {
 // A furnace of reflectance 1: all light comes back, in the mean over samples.
 void expect_a_white_furnace(Model model) {
   std::vector<float> weight(1 << 17);
-  model.compensation = Compensation::turquin;
-  const Places at = places(model, 60, true, 90, 1e-6, kSmallestAlpha, 4);
-  for (std::size_t n = 0; n < at.size(); ++n) {
-    const Mean mean = mean_weight(model, at, n, weight);
-    EXPECT_NEAR(mean.value, 1, (at.alpha_x[n] <= 1 ? 0.005 : 0.02) + 5 * mean.deviation) << at.describe(n);
+  for (const Compensation compensation : {Compensation::turquin, Compensation::kelemen}) {
+    model.compensation = compensation;
+    const Places at = places(model, 60, true, 90, 1e-6, kSmallestAlpha, 4);
+    for (std::size_t n = 0; n < at.size(); ++n) {
+      const Mean mean = mean_weight(model, at, n, weight);
+      EXPECT_NEAR(mean.value, 1, (at.alpha_x[n] <= 1 ? 0.005 : 0.02) + 5 * mean.deviation)
+          << name(compensation) << ", " << at.describe(n);
+    }
   }
 }
 
@@ -233,6 +236,132 @@ TEST_P(Albedo, CompensationIsTurquins) {
           EXPECT_EQ(got[n].status, before[n].status);
         }
       }
+  }
+}
+
+// The places of points' directions i, or o.
+Places places_of(std::span<const Point> points, bool outgoing_ones) {
+  Places at;
+  for (const Point& p : points) {
+    const Vector v = outgoing_ones ? outgoing(p) : incident(p);
+    at.x.push_back(static_cast<float>(v.x));
+    at.y.push_back(static_cast<float>(v.y));
+    at.z.push_back(static_cast<float>(v.z));
+    at.alpha_x.push_back(p.alpha_x), at.alpha_y.push_back(p.alpha_y);
+  }
+  return at;
+}
+
+// Values are those without it and F_ms (1 - E(i)) (1 - E(o)) / (pi (1 - mean E)) o_z, which is the same both ways;
+// densities a mixture. Behind, and of smooth lanes, nothing changes.
+TEST_P(Albedo, KelemensLobe) {
+  const Model model = models().front();
+  use_table(model, small());
+  for (const Interface interface : {Interface::conductor, Interface::schlick}) {
+    Composition with = plain(GetParam(), Sampler::visible), without;
+    with.model.interface = interface;
+    without = with;
+    with.model.compensation = Compensation::kelemen;
+    std::vector<Point> points = hard_points(with, kQuick ? 512 : 4096, 8);
+    points[3].alpha_x = 0;
+    const Operation operation = Operation::evaluate_reflection;
+    const auto got = run_points(operation, with, points), before = run_points(operation, without, points);
+    const Places i = places_of(points, false), o = places_of(points, true);
+    const std::vector<float> albedo_i = albedos(model, i), albedo_o = albedos(model, o);
+    std::vector<float> mean(points.size());
+    Batch batch = i.batch(model);
+    batch.out.mean_albedo = mean;
+    ASSERT_TRUE(facetwise::albedo(batch).ok());
+    int lobes = 0;
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const Point& p = points[n];
+      EXPECT_EQ(got[n].status, before[n].status);
+      if (p.iz <= 0 || p.oz <= 0 || n == 3) {
+        EXPECT_EQ(got[n].value, before[n].value) << describe(p);
+        EXPECT_EQ(got[n].pdf, before[n].pdf) << describe(p);
+        continue;
+      }
+      const double f = interface == Interface::schlick ? p.f0 + (double{p.f90} - p.f0) / 21 : 1;
+      const double again = f * f * mean[n] / std::max(1 - f * (1 - mean[n]), 1e-6);
+      const double share = 1 - albedo_i[n];
+      const double lobe = (interface == Interface::schlick ? again : 1) * share * (1 - double{albedo_o[n]}) * p.oz /
+                          (std::numbers::pi * std::max(1 - double{mean[n]}, 1e-6));
+      const double value = std::min(before[n].value + lobe, 3e38);
+      const double pdf = (1 - share) * before[n].pdf + share * p.oz / std::numbers::pi;
+      // 1 - E has E's rounding.
+      const double rounding = 1e-6 * lobe / (std::min({share, 1 - double{albedo_o[n]}, 1 - double{mean[n]}}) + 1e-9);
+      EXPECT_NEAR(got[n].value, value, 3e-6 * value + 1e-12 + (lobe > 0 ? rounding : 0)) << describe(p);
+      EXPECT_NEAR(got[n].pdf, pdf, 3e-6 * pdf) << describe(p);
+      lobes += lobe > 1e-6 * value;
+    }
+    EXPECT_GT(lobes, kQuick ? 50 : 400);
+  }
+}
+
+// Samples have the density and the weight that queries give, none that the lobe draws is occluded, and their density
+// integrates to one with what is: in 8 x 16 bins of equal solid angle.
+TEST_P(Albedo, KelemensSamples) {
+  const Model model = models().front();
+  use_table(model, small());
+  const Family family = GetParam();
+  const std::size_t count = kQuick ? 20000 : 200000;
+  for (const Sampler sampler : samplers_of(family, Operation::sample_reflection)) {
+    Composition c = plain(family, sampler);
+    c.model.compensation = Compensation::kelemen;
+    std::mt19937_64 random(17);
+    const auto uniform = [&] { return static_cast<float>(random() >> 40) * 0x1p-24f; };
+    std::vector<Point> points(count);
+    for (Point& p : points) {
+      p.ix = 0.48f, p.iy = 0.6f, p.iz = 0.64f;
+      p.alpha_x = 0.9f, p.alpha_y = 0.5f;
+      p.u1 = uniform(), p.u2 = uniform(), p.u3 = uniform();
+    }
+    const auto drawn = run_points(Operation::sample_reflection, c, points);
+    for (std::size_t n = 0; n < count; ++n)
+      points[n].ox = drawn[n].ox, points[n].oy = drawn[n].oy, points[n].oz = drawn[n].oz;
+    const auto asked = run_points(Operation::evaluate_reflection, c, points);
+    constexpr int kTurns = 16, kHeights = 8;
+    std::vector<double> counts(kTurns * kHeights), expected(kTurns * kHeights);
+    const auto bin = [](float x, float y, float z) {
+      const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 0.5;
+      return std::min(static_cast<int>(z * kHeights), kHeights - 1) * kTurns +
+             std::min(static_cast<int>(turn * kTurns), kTurns - 1);
+    };
+    for (std::size_t n = 0; n < count; ++n) {
+      const Result& r = drawn[n];
+      if (r.status != static_cast<std::uint8_t>(LaneStatus::accepted)) {
+        EXPECT_EQ(r.weight, 0);
+        EXPECT_EQ(r.pdf, 0);
+        continue;
+      }
+      ASSERT_GT(r.oz, 0);
+      ASSERT_NEAR(r.pdf, asked[n].pdf, 1e-3 * asked[n].pdf) << describe(points[n]);
+      ASSERT_NEAR(r.weight, asked[n].value / asked[n].pdf, 1e-3 * r.weight + 1e-7) << describe(points[n]);
+      // o is i's reflection about m.
+      ASSERT_NEAR(2 * r.im * r.mx - points[n].ix, r.ox, 1e-4);
+      ASSERT_NEAR(2 * r.im * r.mz - points[n].iz, r.oz, 1e-4);
+      ++counts[static_cast<std::size_t>(bin(r.ox, r.oy, r.oz))];
+    }
+    // The density's integral over a bin, by its midpoints.
+    constexpr int kFine = 24;
+    std::vector<Point> grid;
+    for (int h = 0; h < kHeights * kFine; ++h)
+      for (int t = 0; t < kTurns * kFine; ++t) {
+        const double z = (h + 0.5) / (kHeights * kFine),
+                     phi = 2 * std::numbers::pi * ((t + 0.5) / (kTurns * kFine) - 0.5);
+        Point p = points[0];
+        set_outgoing(p, {std::sqrt(1 - z * z) * std::cos(phi), std::sqrt(1 - z * z) * std::sin(phi), z});
+        grid.push_back(p);
+      }
+    const auto density = run_points(Operation::pdf_reflection, c, grid);
+    for (std::size_t n = 0; n < grid.size(); ++n)
+      expected[static_cast<std::size_t>(bin(grid[n].ox, grid[n].oy, grid[n].oz))] +=
+          density[n].pdf * 2 * std::numbers::pi / static_cast<double>(grid.size()) * static_cast<double>(count);
+    double chi2 = 0;
+    for (std::size_t k = 0; k < counts.size(); ++k)
+      chi2 += (counts[k] - expected[k]) * (counts[k] - expected[k]) / std::max(expected[k], 1.0);
+    // 128 bins: its standard deviation is 16.
+    EXPECT_LT(chi2, 128 + 6 * 16 + 1e-6 * static_cast<double>(count)) << name(sampler);
   }
 }
 

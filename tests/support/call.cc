@@ -190,6 +190,19 @@ void add_compensated(const Model& model, std::vector<Call>& calls) {
   }
 }
 
+// Each with Kelemen's lobe, by one of the operations that have it.
+void add_with_lobe(const Model& model, std::size_t turn, std::vector<Call>& calls) {
+  constexpr Operation kWithLobe[] = {Operation::sample_reflection, Operation::evaluate_reflection,
+                                     Operation::sample_reflection, Operation::pdf_reflection};
+  const Operation operation = kWithLobe[turn % 4];
+  const std::vector<Sampler> samplers = samplers_for(operation, model);
+  Call call{operation, samplers[turn % samplers.size()], Shadowing::correlated, model};
+  call.model.interface = turn % 3 && operation != Operation::pdf_reflection ? Interface::schlick : Interface::conductor;
+  call.model.retro = turn % 5 == 1;
+  call.model.compensation = Compensation::kelemen;
+  calls.push_back(call);
+}
+
 // Small tables, quick to build wherever tests run, each when it is first needed: an emulator takes a second for all.
 void keep_small_albedo_table(const Model& model) {
   static std::mutex mutex;
@@ -247,6 +260,10 @@ std::vector<Call> make_all_calls() {
   std::size_t few = closed;
   for (std::size_t k = closed; k < calls.size(); k += 3) calls[few++] = calls[k];
   calls.resize(few);
+  std::size_t turn = 0;
+  for (const auto& models : {all_models(), tabulated_models()})
+    for (const Model& model : models)
+      if (!is_skewed(model)) add_with_lobe(model, turn++, calls);
 #ifdef FACETWISE_QUICK
   // For an emulator: all of plain GGX, and of the models every seventh; but of Phong's, which take it seconds each, one.
   const std::size_t plain = plain_calls().size();

@@ -88,10 +88,16 @@ class AlbedoTable {
   Key key_{};
 };
 
+// Whether an operation has Kelemen's lobe beside the model's own.
+constexpr bool has_lobe(Operation operation, const Model& model) {
+  return model.compensation == Compensation::kelemen &&
+         (operation == Operation::sample_reflection || operation == Operation::pdf_reflection ||
+          operation == Operation::evaluate_reflection);
+}
 // Whether an operation reads the model's table: albedo, and those that its compensation changes.
 constexpr bool reads_albedo(Operation operation, const Model& model) {
-  return operation == Operation::albedo ||
-         (model.compensation != Compensation::none &&
+  return operation == Operation::albedo || has_lobe(operation, model) ||
+         (model.compensation == Compensation::turquin &&
           (operation == Operation::sample_reflection || operation == Operation::evaluate_reflection));
 }
 

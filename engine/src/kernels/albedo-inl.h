@@ -22,16 +22,19 @@ struct AlbedoPlace {
   using V = Vec<D>;
   V v, a, r, t;
 
-  // z <= 0 is taken as 0.
   template <class S, bool kFast>
   HWY_INLINE AlbedoPlace(D d, const AlbedoTableView& table, const Inputs<D, S>& in,
-                         const Exceptions<D, kFast>& exceptions) {
-    const V alpha_x = exceptions.Computable(in.ax, 1.0f), alpha_y = exceptions.Computable(in.ay, 1.0f);
+                         const Exceptions<D, kFast>& exceptions)
+      : AlbedoPlace(d, table, exceptions.Computable(in.x, 0.0f), exceptions.Computable(in.y, 0.0f),
+                    exceptions.Computable(in.z, 1.0f), exceptions.Computable(in.ax, 1.0f),
+                    exceptions.Computable(in.ay, 1.0f)) {}
+  // z <= 0 is taken as 0.
+  HWY_INLINE AlbedoPlace(D d, const AlbedoTableView& table, V x, V y, V z, V alpha_x, V alpha_y) {
     const V one = Set(d, 1.0f), tiny = Set(d, 1e-30f);
     const V bounded_x = alpha_x / (one + alpha_x), bounded_y = alpha_y / (one + alpha_y);
-    const V x = Abs(exceptions.Computable(in.x, 0.0f)) * bounded_x;
-    const V y = Abs(exceptions.Computable(in.y, 0.0f)) * bounded_y;
-    const V z = Max(exceptions.Computable(in.z, 1.0f), Zero(d));
+    x = Abs(x) * bounded_x;
+    y = Abs(y) * bounded_y;
+    z = Max(z, Zero(d));
     const V horizontal2 = Fma(x, x, y * y), length = Sqrt(Fma(z, z, horizontal2));
     // v / (1 - v) = sqrt(c / (1 - c)), c = z / length.
     const V up = Sqrt(z * (length + z));

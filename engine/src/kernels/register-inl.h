@@ -7,7 +7,7 @@
 #define FACETWISE_REGISTER_INL_H_
 #endif
 
-#include "src/kernels/albedo-inl.h"
+#include "src/kernels/kelemen-inl.h"
 #include "src/kernels/query-inl.h"
 #include "src/kernels/sample-inl.h"
 #include "src/kernels/scatter-inl.h"
@@ -27,6 +27,8 @@ struct Registrar {
     kernels.masking = ForEachVector<D, MaskingOf<D, S>>;
     kernels.albedo = ForEachVector<D, AlbedoOf<D, S>>;
     kernels.compensation = ForEachVector<D, CompensationOf<D, S>>;
+    kernels.lobe = ForEachVector<D, LobeOf<D, S>>;
+    kernels.with_lobe = ForEachVector<D, WithLobe<D, S>>;
   }
   template <class Drawer>
   constexpr Registrar& Add(Sampler sampler) {
