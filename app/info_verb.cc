@@ -12,7 +12,7 @@
 #include "app/errors.h"
 #include "app/verbs.h"
 #include "bench/machine.h"
-#include "facetwise/channel.h"
+#include "facetwise/remote_tables.h"
 #include "facetwise/v1/sampler.pb.h"
 
 namespace facetwise::app {
@@ -41,6 +41,10 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
   v1::InfoResponse info;
   const grpc::Status status = ask_info(*channel, std::chrono::system_clock::now() + kPatience, false, info);
   if (!status.ok()) return absl::UnavailableError(fmt::format("server {}: {}", address, status.error_message()));
+  const auto tables = list_tables(*channel, std::chrono::system_clock::now() + kPatience);
+  if (!tables.ok()) return tables.status();
+  Json ids = Json::array();
+  for (const RemoteTable& table : *tables) ids.push_back(fmt::format("{:016x}", table.id));
   Json targets = Json::array();
   for (const std::string& target : info.available_targets()) targets.push_back(target);
   return Json{{"version", info.version()},
@@ -49,7 +53,8 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
               {"cpu", info.cpu()},
               {"threads", info.threads()},
               {"max_message_bytes", info.max_message_bytes()},
-              {"benchmark_allowed", info.benchmark_allowed()}};
+              {"benchmark_allowed", info.benchmark_allowed()},
+              {"slope_tables", ids}};
 }
 
 void print(const Json& info) {

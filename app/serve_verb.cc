@@ -1,6 +1,7 @@
 // serve: the library's calls for other processes and machines.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
@@ -19,7 +20,8 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 struct ServeVerb {
   ServerOptions options;
   std::size_t max_message_mib = 16, max_mib_in_flight = 1024;
-  int drain_seconds = 10, read_seconds = 20, stream_idle_seconds = 300;
+  std::size_t max_tables_mib = 256;
+  int drain_seconds = 10, read_seconds = 20, stream_idle_seconds = 300, table_idle_seconds = 3600;
   std::string unix_mode = "0600";
 
   int run() {
@@ -32,6 +34,9 @@ struct ServeVerb {
     options.read_timeout = std::chrono::seconds(read_seconds);
     options.stream_idle_timeout = std::chrono::seconds(stream_idle_seconds);
     options.max_bytes_in_flight = max_mib_in_flight * kMiB;
+    options.max_tables_bytes = max_tables_mib * kMiB;
+    options.max_table_bytes = std::min(options.max_table_bytes, options.max_tables_bytes);
+    options.table_idle_timeout = std::chrono::seconds(table_idle_seconds);
     options.drain_timeout = std::chrono::seconds(drain_seconds);
     options.unix_mode = static_cast<unsigned>(std::stoul(unix_mode, nullptr, 8));
     options.benchmark = benchmark_runner(options.execution.target, options.threads);
@@ -94,6 +99,16 @@ Examples:
       .add_option("--stream-idle-seconds", arguments->stream_idle_seconds,
                   "Longest wait for a stream's next message; default 300")
       ->check(CLI::Range(1, 86400))
+      ->option_text("N");
+  command
+      .add_option("--max-tables-mib", arguments->max_tables_mib,
+                  "Tables of slopes that clients upload, together; default 256")
+      ->check(CLI::Range(1, 1 << 20))
+      ->option_text("N");
+  command
+      .add_option("--table-idle-seconds", arguments->table_idle_seconds,
+                  "How long a table stays that nobody uses; default 3600")
+      ->check(CLI::Range(1, 1 << 30))
       ->option_text("N");
   const auto add_file = [&](const char* flag, std::string& file, const char* help) {
     command.add_option(flag, file, help)->option_text("FILE");

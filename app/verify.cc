@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <random>
 
 #include "app/errors.h"
+#include "facetwise/slope_table.h"
 
 namespace facetwise::app {
 namespace {
@@ -95,6 +97,8 @@ Operation drawing(Operation query) {
   return Operation::sample_reflection;
 }
 
+bool is_skewed(const Model& model) { return model.table != nullptr && !model.table->radial(); }
+
 // The inputs of a batch besides what was traced. The batch's columns point into it.
 struct Inputs {
   scene::Lanes lanes;
@@ -115,7 +119,7 @@ struct Inputs {
       correlation = scaled(1.5f, -0.75f, seed + 12);
       batch.mean_slope_x = mean_slope_x;
       batch.mean_slope_y = 0.125f;
-      batch.slope_correlation = correlation;
+      if (!is_skewed(what.model)) batch.slope_correlation = correlation;
     }
     if (what.model.interface == Interface::dielectric) eta = scaled(1.5f, 0.6f, seed + 13);
     if (what.model.interface == Interface::schlick) f0 = scaled(0.9f, 0.02f, seed + 14);
@@ -161,6 +165,21 @@ struct Inputs {
   }
 };
 
+// Small tables of a radial density and of a skewed one.
+std::vector<std::shared_ptr<const SlopeTable>> tables() {
+  std::vector<std::shared_ptr<const SlopeTable>> built;
+  for (const bool radial : {true, false}) {
+    const auto density = [radial](double x, double y) {
+      return std::exp(-x * x - y * y) * (radial || x > 0 ? 1.0 : 1 + x * x);
+    };
+    const auto table = SlopeTable::build(
+        density,
+        {.radial = radial, .grid = 65, .incidence = 9, .slopes = 17, .uniforms = 16, .azimuths = radial ? 0u : 16u});
+    if (table.ok()) built.push_back(*table);
+  }
+  return built;
+}
+
 void add_ggx_smith(std::span<const Sampler> samplers, std::vector<VerifyCase>& cases) {
   for (const bool generator : {true, false})
     for (const Sampler sampler : samplers)
@@ -175,9 +194,10 @@ void add_ggx_smith(std::span<const Sampler> samplers, std::vector<VerifyCase>& c
                    .sampler = samplers[samplers.size() > 1 ? samplers.size() - 2 : 0]});
   cases.push_back({.operation = Operation::masking, .sampler = samplers.back()});
   cases.push_back({.operation = Operation::albedo, .sampler = samplers.back()});
-  cases.push_back({.operation = Operation::sample_reflection,
-                   .model = {.interface = Interface::schlick, .compensation = Compensation::turquin},
-                   .sampler = samplers.back()});
+  for (const Compensation compensation : {Compensation::turquin, Compensation::kelemen})
+    cases.push_back({.operation = Operation::sample_reflection,
+                     .model = {.interface = Interface::schlick, .compensation = compensation},
+                     .sampler = samplers.back()});
 }
 
 // What `samplers` have of a composition, each operation that reads a sampler with each that fits. What else a model
@@ -200,7 +220,7 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
       if (turn % 4 == 1) what.model.transport = Transport::importance;
       if (!both_sides && operation != Operation::sample_normal)
         what.model.interface = turn % 2 == 0 ? Interface::schlick : Interface::dielectric;
-      if (turn % 5 == 3) what.model.retro = true;
+      if (turn % 5 == 3) what.model.retro = !is_skewed(model);
       cases.push_back(what);
     }
   }
@@ -214,10 +234,14 @@ void add_composition(const Model& composition, std::span<const Sampler> samplers
 std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
   std::vector<VerifyCase> cases;
   add_ggx_smith(samplers, cases);
-  for (const Model& model : all_models()) add_composition(model, samplers, cases);
+  std::vector<Model> models = all_models();
+  for (const auto& table : tables())
+    for (const Model& model : all_models(table))
+      if (model.distribution == Distribution::table) models.push_back(model);
+  for (const Model& model : models) add_composition(model, samplers, cases);
   // Mean slopes and correlated roughness.
   if (std::find(samplers.begin(), samplers.end(), Sampler::visible) == samplers.end()) return cases;
-  for (const Model& model : all_models())
+  for (const Model& model : models)
     for (const Operation operation :
          {Operation::sample_normal, Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
       if (takes_slopes(model))

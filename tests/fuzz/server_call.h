@@ -29,6 +29,7 @@ inline void make_albedo_tables() {
 template <class Answer>
 void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   static Compute compute(1, {});
+  static Tables tables(0, {});
   static Watch watch;
   static Admission admission(8, 64 * kMessageBytes);
   static const bool ready = [] {
@@ -45,10 +46,11 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   grpc::ByteBuffer request(slices.data(), slices.size());
   grpc::ServerContext context;
   Admission::Ticket ticket(admission);
-  const auto answered = answer(request, CallTools{{kMessageBytes}, compute, ticket, watch, context});
+  const auto answered = answer(request, CallTools{{kMessageBytes}, compute, tables, ticket, watch, context});
   // What is too much or malformed is refused; nothing else goes wrong.
   if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&
       answered.status().code() != absl::StatusCode::kResourceExhausted &&
+      answered.status().code() != absl::StatusCode::kNotFound &&
       answered.status().code() != absl::StatusCode::kUnimplemented)
     std::abort();
   if (answered.ok() && answered->Length() > 2 * kMessageBytes) std::abort();

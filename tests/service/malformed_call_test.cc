@@ -205,7 +205,7 @@ TEST_F(MalformedCall, CompressedMessagesAreRefused) {
     context.set_compression_algorithm(algorithm);
     v1::BatchResponse response;
     v1::BatchRequest request = good_request(3);
-    request.mutable_model()->set_slope_table(std::string(std::size_t{200} << 20, 'x'));
+    request.set_f0(std::string(std::size_t{200} << 20, 'x'));
     const grpc::Status status = stub_->Run(&context, request, &response);
     expect_error(status, StatusCode::UNIMPLEMENTED, "");
   }

@@ -213,6 +213,16 @@ TEST_F(Secured, CallsCarryATokenOfTheFile) {
       EXPECT_FALSE(reader->Read(&progress));
       EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::UNAUTHENTICATED) << value;
     }
+    {
+      grpc::ClientContext upload, list, remove;
+      for (auto* context : {&upload, &list, &remove}) carries(*context);
+      v1::SlopeTableInfo info;
+      v1::ListTablesResponse tables;
+      v1::DeleteTableResponse deleted;
+      EXPECT_EQ(stub->UploadTable(&upload, &info)->Finish().error_code(), grpc::StatusCode::UNAUTHENTICATED) << value;
+      EXPECT_EQ(stub->ListTables(&list, {}, &tables).error_code(), grpc::StatusCode::UNAUTHENTICATED) << value;
+      EXPECT_EQ(stub->DeleteTable(&remove, {}, &deleted).error_code(), grpc::StatusCode::UNAUTHENTICATED) << value;
+    }
   }
 
   // The file is read again; one that cannot be used changes nothing.

@@ -39,6 +39,10 @@ int main(int argc, char** argv) {
   long read_ms = 20000, idle_ms = 300000;
   app.add_option("--read-ms", read_ms);
   app.add_option("--idle-ms", idle_ms);
+  long table_idle_ms = 3600000;
+  app.add_option("--max-table-bytes", options.max_table_bytes);
+  app.add_option("--max-tables-bytes", options.max_tables_bytes);
+  app.add_option("--table-idle-ms", table_idle_ms);
   app.add_flag("--insecure", options.insecure);
   app.add_option("--tls-certificate", options.tls_certificate);
   app.add_option("--tls-key", options.tls_key);
@@ -49,6 +53,7 @@ int main(int argc, char** argv) {
   options.drain_timeout = std::chrono::milliseconds(drain_ms);
   options.read_timeout = std::chrono::milliseconds(read_ms);
   options.stream_idle_timeout = std::chrono::milliseconds(idle_ms);
+  options.table_idle_timeout = std::chrono::milliseconds(table_idle_ms);
   options.benchmark = report_steps;
   const absl::Status status = facetwise::serve(options, [](const facetwise::Server& server) {
     for (const std::string& address : server.addresses()) std::printf("%s\n", address.c_str());

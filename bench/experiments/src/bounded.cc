@@ -95,7 +95,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
   if (!opened.ok()) return opened.status();
   render::Scene scene = *std::move(opened);
   render::Settings settings;
-  settings.width = by_size(options, 256, 448, 4096);
+  settings.width = by_size(options, 256, 416, 4096);
   settings.height = static_cast<int>(static_cast<float>(settings.width) / scene.aspect);
   constexpr std::uint32_t kSamples = 8;
   const std::uint32_t reference_samples = kSamples * by_size(options, 64u, 256u, 256u);

@@ -130,7 +130,7 @@ absl::StatusOr<Page> convergence_page(const Options& options) {
   auto scene = lit("glass");
   if (!scene.ok()) return scene.status();
   render::Settings settings;
-  settings.width = by_size(options, 64, 80, 512);
+  settings.width = by_size(options, 64, 72, 512);
   settings.height = settings.width;
   settings.light_sampling = false;
   const std::uint32_t many = 64 * by_size(options, 16u, 256u, 256u);

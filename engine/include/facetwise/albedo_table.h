@@ -106,5 +106,7 @@ constexpr bool reads_albedo(Operation operation, const Model& model) {
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> albedo_table(const Model& model,
                                                                 const std::function<void(double)>& progress = {});
 void use_albedo_table(std::shared_ptr<const AlbedoTable> table);
+// Forgets those of a table of slopes, by SlopeTable::id(). Calls that use one finish with it.
+void drop_albedo_tables(std::uint64_t slopes);
 
 }  // namespace facetwise

@@ -37,11 +37,15 @@ struct Kept {
 };
 class KeptTables {
  public:
-  Kept& of(const AlbedoTable::Key& key) {
+  std::shared_ptr<Kept> of(const AlbedoTable::Key& key) {
     const std::lock_guard lock(mutex_);
     for (auto& [at, kept] : all_)
-      if (at == key) return *kept;
-    return *all_.emplace_back(key, std::make_unique<Kept>()).second;
+      if (at == key) return kept;
+    return all_.emplace_back(key, std::make_shared<Kept>()).second;
+  }
+  void drop(std::uint64_t slopes) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(all_, [&](const auto& entry) { return entry.first.slopes == slopes; });
   }
   static KeptTables& instance() {
     static KeptTables tables;
@@ -50,7 +54,7 @@ class KeptTables {
 
  private:
   std::mutex mutex_;
-  std::vector<std::pair<AlbedoTable::Key, std::unique_ptr<Kept>>> all_;
+  std::vector<std::pair<AlbedoTable::Key, std::shared_ptr<Kept>>> all_;
 };
 
 }  // namespace
@@ -129,20 +133,22 @@ absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::load(const std::
 
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> albedo_table(const Model& model,
                                                                 const std::function<void(double)>& progress) {
-  Kept& kept = KeptTables::instance().of(AlbedoTable::key_of(model));
-  const std::lock_guard lock(kept.mutex);
-  if (kept.table != nullptr) return kept.table;
+  const auto kept = KeptTables::instance().of(AlbedoTable::key_of(model));
+  const std::lock_guard lock(kept->mutex);
+  if (kept->table != nullptr) return kept->table;
   absl::StatusOr<std::shared_ptr<const AlbedoTable>> built;
   // Isolated: a task of the caller's that this thread took up meanwhile might ask for the same table.
   tbb::this_task_arena::isolate([&] { built = AlbedoTable::build(model, {.progress = progress}); });
-  if (built.ok()) kept.table = *built;
+  if (built.ok()) kept->table = *built;
   return built;
 }
 
 void use_albedo_table(std::shared_ptr<const AlbedoTable> table) {
-  Kept& kept = KeptTables::instance().of(table->key());
-  const std::lock_guard lock(kept.mutex);
-  kept.table = std::move(table);
+  const auto kept = KeptTables::instance().of(table->key());
+  const std::lock_guard lock(kept->mutex);
+  kept->table = std::move(table);
 }
+
+void drop_albedo_tables(std::uint64_t slopes) { KeptTables::instance().drop(slopes); }
 
 }  // namespace facetwise

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "facetwise/slope_table.h"
 #include "facetwise/v1/sampler.pb.h"
 #include "src/gather.h"
 #include "src/pieces.h"
@@ -69,6 +70,7 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
   model.set_transport(wire::to_proto(batch.model.transport));
   model.set_retro(batch.model.retro);
   model.set_compensation(wire::to_proto(batch.model.compensation));
+  if (batch.model.table != nullptr) model.set_slope_table(batch.model.table->id());
   small.set_sampler(wire::to_proto(batch.sampler));
   small.set_lanes(range.size());
   for (int output = v1::Output_MIN; output <= v1::Output_MAX; ++output)

@@ -1,5 +1,9 @@
+#include <mutex>
+#include <set>
+
 #include "absl/strings/str_cat.h"
 #include "facetwise/client.h"
+#include "facetwise/remote_tables.h"
 #include "facetwise/v1/sampler.pb.h"
 #include "src/pieces.h"
 #include "src/pipeline.h"
@@ -18,10 +22,13 @@ class RemoteEngine final : public Engine {
 
   absl::StatusOr<Statistics> run(Operation operation, const Batch& batch) override {
     if (auto status = check(operation, batch); !status.ok()) return status;
-    BatchPieces batch_pieces(operation, batch, limits_);
-    const Pieces pieces = batch_pieces.pieces();
-    if (auto status = send(connections_, options_, pieces); !status.ok()) return status;
-    return batch_pieces.statistics();
+    if (batch.model.table == nullptr) return send_pieces(operation, batch);
+    // A server may have lost a table: started again, or it was not used for long.
+    for (bool again = false;; again = true) {
+      if (auto status = upload(*batch.model.table, again); !status.ok()) return status;
+      auto statistics = send_pieces(operation, batch);
+      if (again || statistics.status().code() != absl::StatusCode::kNotFound) return statistics;
+    }
   }
 
   absl::StatusOr<std::size_t> compact(const Compaction& compaction) override {
@@ -43,9 +50,30 @@ class RemoteEngine final : public Engine {
   }
 
  private:
+  absl::StatusOr<Statistics> send_pieces(Operation operation, const Batch& batch) {
+    BatchPieces batch_pieces(operation, batch, limits_);
+    const Pieces pieces = batch_pieces.pieces();
+    if (auto status = send(connections_, options_, pieces); !status.ok()) return status;
+    return batch_pieces.statistics();
+  }
+  // To the servers that have not got it from here, or to all.
+  absl::Status upload(const SlopeTable& table, bool to_all) {
+    const std::lock_guard lock(uploaded_mutex_);
+    if (!to_all && uploaded_.contains(table.id())) return absl::OkStatus();
+    const std::size_t piece = std::min(limits_.piece_bytes, limits_.message_bytes / 2);
+    for (const auto& [channel, stub] : connections_)
+      if (auto status = upload_table(channel, table, piece, std::chrono::system_clock::now() + options_.call_timeout);
+          !status.ok())
+        return status;
+    uploaded_.insert(table.id());
+    return absl::OkStatus();
+  }
+
   const std::vector<Connection> connections_;
   const ConnectOptions options_;
   const PieceLimits limits_;
+  std::mutex uploaded_mutex_;
+  std::set<std::uint64_t> uploaded_;  // by SlopeTable::id()
 };
 
 // Why a server does not answer that was not waited for: gRPC tells only then.

@@ -35,7 +35,7 @@ class Decoder {
       : reader_(message), block_(message.Length() + (input_fields().size() + 1) * kAlignment) {}
 
   absl::Status read();
-  absl::Status make_batch(const Limits& limits, Batch& batch);
+  absl::Status make_batch(const Limits& limits, Tables& tables, Batch& batch);
 
   std::uint64_t lanes() const { return lanes_; }
   Operation operation() const { return *operation_; }
@@ -44,7 +44,6 @@ class Decoder {
  private:
   absl::Status read_field(const MessageReader::Field& field);
   absl::Status read_model(std::size_t bytes);
-  absl::Status read_slope_table(const MessageReader::Field& field);
   absl::Status read_direction(int field, std::size_t bytes);
   absl::Status read_generator(std::size_t bytes);
   absl::Status read_outputs(const MessageReader::Field& field);
@@ -65,6 +64,7 @@ class Decoder {
   int distribution_ = 0, masking_ = 0, shadowing_ = 0, normalisation_ = 0, interface_ = 0, transport_ = 0,
       compensation_ = 0;
   bool retro_ = false;
+  std::uint64_t slope_table_ = 0;
   std::optional<Operation> operation_;
   std::uint64_t lanes_ = 0;
   unsigned outputs_ = 0;
@@ -141,17 +141,11 @@ absl::Status Decoder::read_model(std::size_t bytes) {
         retro_ = value != 0;
         return good ? absl::OkStatus() : damaged_message();
       }
-      case v1::Model::kSlopeTableFieldNumber: return read_slope_table(field);
+      case v1::Model::kSlopeTableFieldNumber:
+        return reader_.eight_bytes(field, slope_table_) ? absl::OkStatus() : damaged_message();
       default: return reader_.skip(field) ? absl::OkStatus() : damaged_message();
     }
   });
-}
-
-absl::Status Decoder::read_slope_table(const MessageReader::Field& field) {
-  std::size_t bytes = 0;
-  if (!reader_.length(field, bytes)) return damaged_message();
-  if (bytes > 0) return invalid_field("model.slope_table", "this server takes no tables");
-  return absl::OkStatus();
 }
 
 absl::Status Decoder::read_direction(int direction, std::size_t bytes) {
@@ -225,7 +219,7 @@ absl::Status Decoder::read_column(absl::string_view name, std::size_t width, con
 }
 
 // The wire's own checks; the rest is for the engine's.
-absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
+absl::Status Decoder::make_batch(const Limits& limits, Tables& tables, Batch& batch) {
   const auto unknown = [](absl::string_view field, int value) {
     return invalid_field(field, absl::StrCat("unknown value ", value));
   };
@@ -254,6 +248,12 @@ absl::Status Decoder::make_batch(const Limits& limits, Batch& batch) {
                  .transport = *transport,
                  .compensation = *compensation,
                  .retro = retro_};
+  if (slope_table_ != 0) {
+    batch.model.table = tables.find(slope_table_);
+    if (batch.model.table == nullptr)
+      return absl::NotFoundError(
+          absl::StrCat("model.slope_table: no table ", absl::Hex(slope_table_, absl::kZeroPad16), " here: upload it"));
+  }
   // Until the columns are there, which decide what an unspecified one means.
   if (!wire::sampler_from(sampler_, Sampler::visible)) return unknown("sampler", sampler_);
   if (auto status = check_lanes(lanes_, limits); !status.ok()) return status;
@@ -357,7 +357,7 @@ absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const C
   Batch batch;
   if (auto status = decoder.read(); !status.ok()) return status;
   request.Clear();
-  if (auto status = decoder.make_batch(tools.limits, batch); !status.ok()) return status;
+  if (auto status = decoder.make_batch(tools.limits, tools.tables, batch); !status.ok()) return status;
 
   const Response response(decoder.outputs(), decoder.lanes());
   if (response.bytes() > tools.limits.message_bytes)

@@ -9,6 +9,7 @@
 #include "grpcpp/support/byte_buffer.h"
 #include "src/admission.h"
 #include "src/compute.h"
+#include "src/tables.h"
 #include "src/watch.h"
 
 namespace facetwise {
@@ -25,6 +26,7 @@ inline constexpr std::size_t kMostCompactColumns = 64;
 struct CallTools {
   Limits limits;
   Compute& compute;
+  Tables& tables;
   Admission::Ticket& ticket;
   Watch& watch;
   grpc::ServerContext& context;

@@ -2,6 +2,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
+#include "facetwise/slope_table.h"
 #include "src/machine.h"
 #include "wire/status.h"
 
@@ -14,6 +15,13 @@ using wire::to_grpc;
 
 grpc::Status error(grpc::StatusCode code, const std::string& message) { return {code, message}; }
 
+void describe(const Tables::Entry& entry, v1::SlopeTableInfo& info) {
+  info.set_id(entry.table->id());
+  info.set_bytes(entry.table->bytes());
+  info.set_radial(entry.table->radial());
+  info.set_idle_seconds(entry.idle.count());
+}
+
 }  // namespace
 
 SamplerService::SamplerService(const ServerOptions& options)
@@ -21,11 +29,30 @@ SamplerService::SamplerService(const ServerOptions& options)
       limits_{options.max_message_bytes},
       admission_(options.max_calls, options.max_bytes_in_flight),
       compute_(options.threads, options.execution),
+      tables_(options.max_tables_bytes, options.table_idle_timeout),
       tokens_(options.token_file) {
   add("/facetwise.v1.Sampler/Run", answer_batch, Messages::one);
   add("/facetwise.v1.Sampler/RunStream", answer_batch, Messages::many);
   add("/facetwise.v1.Sampler/Compact", answer_compact, Messages::one);
   add("/facetwise.v1.Sampler/CompactStream", answer_compact, Messages::many);
+  AddMethod(new RpcServiceMethod(
+      "/facetwise.v1.Sampler/UploadTable", RpcMethod::CLIENT_STREAMING,
+      new grpc::internal::ClientStreamingHandler<SamplerService, v1::TableChunk, v1::SlopeTableInfo>(
+          [](SamplerService* service, grpc::ServerContext* context, grpc::ServerReader<v1::TableChunk>* reader,
+             v1::SlopeTableInfo* response) { return service->upload_table(*context, *reader, *response); },
+          this)));
+  AddMethod(new RpcServiceMethod(
+      "/facetwise.v1.Sampler/ListTables", RpcMethod::NORMAL_RPC,
+      new grpc::internal::RpcMethodHandler<SamplerService, v1::ListTablesRequest, v1::ListTablesResponse>(
+          [](SamplerService* service, grpc::ServerContext* context, const v1::ListTablesRequest*,
+             v1::ListTablesResponse* response) { return service->list_tables(*context, *response); },
+          this)));
+  AddMethod(new RpcServiceMethod(
+      "/facetwise.v1.Sampler/DeleteTable", RpcMethod::NORMAL_RPC,
+      new grpc::internal::RpcMethodHandler<SamplerService, v1::DeleteTableRequest, v1::DeleteTableResponse>(
+          [](SamplerService* service, grpc::ServerContext* context, const v1::DeleteTableRequest* request,
+             v1::DeleteTableResponse*) { return service->delete_table(*context, *request); },
+          this)));
   AddMethod(
       new RpcServiceMethod("/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
                            new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
@@ -66,7 +93,7 @@ grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& cont
       return error(grpc::StatusCode::INVALID_ARGUMENT, "message: more than one, in a call that takes one");
     if (context.IsCancelled()) return grpc::Status::CANCELLED;
   }
-  auto answered = answer(request, {limits_, compute_, ticket, watch_, context});
+  auto answered = answer(request, {limits_, compute_, tables_, ticket, watch_, context});
   if (!answered.ok()) return to_grpc(answered.status());
   stream.WriteLast(*answered, {});
   return grpc::Status::OK;
@@ -82,12 +109,66 @@ grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& con
       if (!stream.Read(&request)) return context.IsCancelled() ? grpc::Status::CANCELLED : grpc::Status::OK;
     }
     if (context.IsCancelled()) return grpc::Status::CANCELLED;
-    auto answered = answer(request, {limits_, compute_, ticket, watch_, context});
+    auto answered = answer(request, {limits_, compute_, tables_, ticket, watch_, context});
     if (!answered.ok()) return to_grpc(answered.status());
     if (!stream.Write(*answered)) return grpc::Status::CANCELLED;  // the client has gone
     ticket.release();
     if (admission_.closed()) return error(grpc::StatusCode::UNAVAILABLE, "the server is shutting down");
   }
+}
+
+grpc::Status SamplerService::upload_table(grpc::ServerContext& context, grpc::ServerReader<v1::TableChunk>& reader,
+                                          v1::SlopeTableInfo& response) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+  Admission::Ticket ticket(admission_);
+  if (!ticket.status().ok()) return to_grpc(ticket.status());
+  v1::TableChunk chunk;
+  const auto read = [&] {
+    const Watch::Reading reading(watch_, context, options_.read_timeout);
+    return reader.Read(&chunk) && !context.IsCancelled();
+  };
+  const auto invalid = [](const std::string& message) { return error(grpc::StatusCode::INVALID_ARGUMENT, message); };
+  if (!read()) return context.IsCancelled() ? grpc::Status::CANCELLED : invalid("message: none");
+  const std::uint64_t id = chunk.id(), bytes = chunk.bytes();
+  if (auto kept = tables_.find(id)) {
+    describe({kept, {}}, response);
+    return grpc::Status::OK;
+  }
+  if (bytes > options_.max_table_bytes)
+    return invalid(absl::StrCat("bytes: ", bytes, " are above the limit of ", options_.max_table_bytes));
+  // As received, and as read.
+  if (auto status = ticket.hold(2 * bytes); !status.ok()) return to_grpc(status);
+  std::string data;
+  data.reserve(bytes);
+  do {
+    if (chunk.data().size() > bytes - data.size())
+      return invalid(absl::StrCat("data: more than the ", bytes, " bytes that were announced"));
+    data += chunk.data();
+  } while (data.size() < bytes && read());
+  if (context.IsCancelled()) return grpc::Status::CANCELLED;
+  if (data.size() < bytes) return invalid(absl::StrCat("data: ", data.size(), " of the ", bytes, " bytes announced"));
+  const auto table = SlopeTable::parse(data);
+  if (!table.ok())
+    return to_grpc(absl::Status(table.status().code(), absl::StrCat("data: ", table.status().message())));
+  if ((*table)->id() != id) return invalid("id: not that of the table");
+  if (auto status = tables_.put(*table); !status.ok()) return to_grpc(status);
+  describe({*table, {}}, response);
+  return grpc::Status::OK;
+}
+
+grpc::Status SamplerService::list_tables(grpc::ServerContext& context, v1::ListTablesResponse& response) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+  for (const Tables::Entry& entry : tables_.list()) describe(entry, *response.add_tables());
+  response.set_max_bytes(tables_.max_bytes());
+  response.set_max_idle_seconds(std::chrono::duration<double>(tables_.max_idle()).count());
+  return grpc::Status::OK;
+}
+
+grpc::Status SamplerService::delete_table(grpc::ServerContext& context, const v1::DeleteTableRequest& request) {
+  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+  if (tables_.erase(request.id())) return grpc::Status::OK;
+  return error(grpc::StatusCode::NOT_FOUND,
+               absl::StrCat("id: no table ", absl::Hex(request.id(), absl::kZeroPad16), " here"));
 }
 
 grpc::Status SamplerService::info(grpc::ServerContext& context, v1::InfoResponse& response) {

@@ -14,6 +14,7 @@
 #include "src/admission.h"
 #include "src/call.h"
 #include "src/compute.h"
+#include "src/tables.h"
 #include "src/tokens.h"
 #include "src/watch.h"
 
@@ -40,6 +41,10 @@ class SamplerService final : public grpc::Service {
   void add(const char* name, Answer answer, Messages messages);
   grpc::Status answer_one(Answer answer, grpc::ServerContext& context, Stream& stream);
   grpc::Status answer_many(Answer answer, grpc::ServerContext& context, Stream& stream);
+  grpc::Status upload_table(grpc::ServerContext& context, grpc::ServerReader<v1::TableChunk>& reader,
+                            v1::SlopeTableInfo& response);
+  grpc::Status list_tables(grpc::ServerContext& context, v1::ListTablesResponse& response);
+  grpc::Status delete_table(grpc::ServerContext& context, const v1::DeleteTableRequest& request);
   grpc::Status info(grpc::ServerContext& context, v1::InfoResponse& response);
   grpc::Status benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
                          grpc::ServerWriter<v1::BenchmarkProgress>& writer);
@@ -48,6 +53,7 @@ class SamplerService final : public grpc::Service {
   const Limits limits_;
   Admission admission_;
   Compute compute_;
+  Tables tables_;
   Watch watch_;
   Tokens tokens_;
   std::atomic<bool> benchmark_runs_{false};

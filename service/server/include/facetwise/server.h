@@ -50,6 +50,9 @@ struct ServerOptions {
   // Bytes of requests (twice: as received, and as decoded) and responses held at once; a call that would go above gets
   // RESOURCE_EXHAUSTED. Three times max_message_bytes at least.
   std::size_t max_bytes_in_flight = std::size_t{1} << 30;
+  // Tables of slopes that clients upload: largest of one, of all together, and how long one stays that nobody uses.
+  std::size_t max_table_bytes = std::size_t{64} << 20, max_tables_bytes = std::size_t{256} << 20;
+  std::chrono::milliseconds table_idle_timeout{3600000};
   // How long a call may take to send its message, and a stream may leave between messages, before it is cancelled.
   std::chrono::milliseconds read_timeout{20000}, stream_idle_timeout{300000};
   // How long drain() waits for calls in flight before it ends them.
