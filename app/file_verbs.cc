@@ -27,7 +27,7 @@ Columns that are not known (ids, names) are in the output as they were.
   ix iy iz         incident direction, a unit vector in the local frame that points away from the surface
   alpha_x alpha_y  roughness: the distribution's own parameter, 1e-4 to 10, phong to 1 (or --alpha)
   mean_slope_x mean_slope_y slope_correlation
-                   moments of the slopes, 0 where they are left out; ggx, beckmann and tables with smith
+                   mean and correlation of the slopes, 0 where they are left out; ggx, beckmann and tables with smith
   eta              eta_o / eta_i, 0.01 to 100; --interface dielectric (or --eta)
   f0 f90           reflectance straight on, and grazing (1 if left out); --interface schlick (or --f0, --f90)
 )";
@@ -239,10 +239,12 @@ Example:
 
 Verb add_albedo(CLI::App& app) {
   return add_file_verb(app, "albedo", Operation::albedo, {},
-                       "What share of the light from each direction a surface reflects, by one scattering with F = 1",
+                       "What share of the light from each direction a surface reflects, by one scattering with F = 1, "
+                       "or as a dielectric",
                        std::string(kFiles) + R"(Written:
   albedo           of that direction; a smooth lane has 1
   mean_albedo      the average over the hemisphere, by the cosine
+  transmitted      what goes through (--interface dielectric)
 )" + kStatus + R"(
 Example:
   facetwise albedo --alpha 0.5 --input directions.csv --output albedo.csv --albedo-table ggx.albedo)");

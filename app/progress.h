@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <utility>
@@ -28,7 +29,7 @@ class Progress {
     shown_ = percent;
     if (terminal_) {
       const double taken = std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-      const auto left = static_cast<int>(taken * (1 - done) / std::max(done, 1e-9) + 0.5);
+      const auto left = std::lround(taken * (1 - done) / std::max(done, 1e-9));
       fmt::print(stderr, "\r{}: {:3} %, {}:{:02} left ", what_, percent, left / 60, left % 60);
     } else {
       fmt::print(stderr, "{}: {} %\n", what_, percent);

@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
@@ -72,12 +73,12 @@ struct RenderVerb {
   }
 
   absl::Status try_run() {
-    if (output.empty() && png.empty()) return invalid("--output or --png: where shall the picture go?");
+    if (output.empty() && png.empty()) return invalid("--output or --png: where does the picture go?");
     auto opened = open_scene();
     if (!opened.ok()) return opened.status();
     settings.width = width;
     settings.height =
-        height > 0 ? height : std::max(1, static_cast<int>(0.5f + static_cast<float>(width) / opened->aspect));
+        height > 0 ? height : std::max(1, static_cast<int>(std::lround(static_cast<float>(width) / opened->aspect)));
     settings.light_sampling = !no_light_sampling;
     std::unique_ptr<Engine> calls;
     if (scalar) {

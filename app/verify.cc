@@ -114,7 +114,7 @@ struct Inputs {
     batch.incident = {lanes.incident_x, lanes.incident_y, lanes.incident_z};
     batch.alpha_x = lanes.alpha_x;
     batch.alpha_y = lanes.alpha_y;
-    if (what.moments) {
+    if (what.affine) {
       mean_slope_x = scaled(0.5f, -0.25f, seed + 11);
       correlation = scaled(1.5f, -0.75f, seed + 12);
       batch.mean_slope_x = mean_slope_x;
@@ -245,7 +245,7 @@ std::vector<VerifyCase> verify_cases(std::span<const Sampler> samplers) {
     for (const Operation operation :
          {Operation::sample_normal, Operation::sample_reflection, Operation::evaluate_reflection, Operation::masking})
       if (takes_slopes(model))
-        cases.push_back({.operation = operation, .model = model, .sampler = Sampler::visible, .moments = true});
+        cases.push_back({.operation = operation, .model = model, .sampler = Sampler::visible, .affine = true});
   return cases;
 }
 

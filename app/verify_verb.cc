@@ -55,7 +55,7 @@ std::string shown(const VerifyCase& what) {
   if (what.model.interface != Interface::conductor) text += fmt::format(" {}", name(what.model.interface));
   if (what.model.compensation != Compensation::none) text += fmt::format(" {}", name(what.model.compensation));
   if (what.model.retro) text += " retro";
-  if (what.moments) text += " moments";
+  if (what.affine) text += " with mean slopes";
   if (samples) text += what.generator ? " by seed" : " by columns";
   return text;
 }
@@ -78,7 +78,7 @@ struct Totals {
       local_seconds += batch.local_seconds;
       if (batch.what.operation != Operation::sample_reflection) continue;
       // Retro-reflection and mean slopes have shares of their own.
-      if (batch.what.model.retro || batch.what.moments) continue;
+      if (batch.what.model.retro || batch.what.affine) continue;
       Count& count = reflections[{batch.what.model.distribution, batch.what.model.masking, batch.what.sampler}];
       count.samples += batch.statistics.lanes();
       count.occluded += batch.statistics.occluded;
@@ -141,7 +141,7 @@ Json to_json(const Verification& verification, const std::string& mesh, const En
                                {"interface", name(batch.what.model.interface)},
                                {"transport", name(batch.what.model.transport)},
                                {"retro", batch.what.model.retro},
-                               {"moments", batch.what.moments},
+                               {"mean_slopes", batch.what.affine},
                                {"random", batch.what.generator ? "seed" : "columns"},
                                {"lanes", batch.statistics.lanes()},
                                {"accepted", batch.statistics.accepted},

@@ -270,7 +270,7 @@ absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options) {
   const RE2 filter(options.filter, quiet);
   if (!filter.ok())
     return absl::InvalidArgumentError(
-        absl::StrCat("filter: \"", options.filter, "\" is no regular expression: ", filter.error()));
+        absl::StrCat("filter: \"", options.filter, "\" is not a regular expression: ", filter.error()));
   std::vector<Case> cases;
   if (options.suite == BenchSuite::quick)
     cases = quick_cases();

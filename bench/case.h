@@ -59,12 +59,12 @@ struct Case {
 BenchResult describe(const Case& which);
 
 // What options.suite and options.filter choose, comparable cases together; remote ones only if there is a
-// server. InvalidArgument for a filter that is no regular expression or matches nothing.
+// server. InvalidArgument for a filter that is not a regular expression or matches nothing.
 absl::StatusOr<std::vector<Case>> choose_cases(const BenchOptions& options);
 
 // Floating-point operations of a lane with i_z > 0 that ends up accepted, counted by hand from the kernels'
 // formulas: + - * / and sqrt are one, a fused multiply-add two; comparisons, selects, integers (random
-// numbers) and conversions are none. 0 where nobody has counted: models besides GGX with Smith, and scattering.
+// numbers) and conversions are not counted. 0 where nobody has counted: models besides GGX with Smith, and scattering.
 int flops(const Case& which);
 
 }  // namespace facetwise::bench

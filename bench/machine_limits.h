@@ -12,7 +12,7 @@ inline constexpr int kCopyOrders = 3;
 enum class CopyOrder {
   one_by_one,    // column after column: memcpy, and a sum over those that are only read
   side_by_side,  // a vector of each column at a time, as the kernels do
-  streaming,     // likewise, with stores past the caches: quicker beyond them, slower inside
+  streaming,     // the same with stores past the caches: quicker beyond them, slower inside
 };
 
 // Reads `inputs` columns and writes `outputs` of them (no more than inputs), once, over `batch` lanes (a

@@ -145,19 +145,19 @@ absl::Status count_rejections(std::size_t samples, Target target, const std::fun
     return each(experiment, {}, kGgxSamplers, alpha_x, alpha_y, theta, lanes);
   };
   for (const auto& [theta, alpha_x, alpha_y] : kTable)
-    if (const auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok()) return status;
+    if (auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok()) return status;
   for (const auto& [alpha_x, alpha_y] : kSweepAlpha)
     for (const double theta : kSweepTheta)
-      if (const auto status = all_at("sweep", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())
+      if (auto status = all_at("sweep", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())
         return status;
   for (const auto& [alpha, lanes] : kPost)
     for (const double theta : kPostTheta)
-      if (const auto status = all_at("post-2015", alpha, alpha, theta, lanes); !status.ok()) return status;
+      if (auto status = all_at("post-2015", alpha, alpha, theta, lanes); !status.ok()) return status;
   std::vector<Configuration> configurations(std::begin(kTable), std::end(kTable));
   configurations.push_back(kBehind);
   for (const auto& [distribution, masking] : kModels)
     for (const auto& [theta, alpha_x, alpha_y] : configurations)
-      if (const auto status = each("models", {.distribution = distribution, .masking = masking}, kModelSamplers,
+      if (auto status = each("models", {.distribution = distribution, .masking = masking}, kModelSamplers,
                                    alpha_x, alpha_y, theta * kPi / 180, samples);
           !status.ok())
         return status;

@@ -210,7 +210,7 @@ class Measuring {
                      .unit = "x",
                      .note = {}};
     if (columns_.lanes() < kTargetLanes) {
-      row.note = "not measured: there is no memory for 16 M lanes";
+      row.note = "not measured: not enough memory for 16 M lanes";
     } else if (threads && report_.threads < 2) {
       row.note = "not measured: one thread only";
     } else {
@@ -246,7 +246,7 @@ class Measuring {
                      .unit = "x",
                      .note = {}};
     if (columns_.malloc_lanes() < lanes) {
-      row.note = "not measured: there is no memory for 16 M lanes twice";
+      row.note = "not measured: not enough memory for 16 M lanes twice";
     } else {
       const Case kind = sampling(Sampler::cap, Implementation::simd, lanes);
       Case placed = kind;

@@ -72,7 +72,7 @@ inline Sample reflect(Vec3 i, const Stretched& w, Vec3 h, float ax, float ay, fl
   const float im = std::max(w.x * h.x + w.y * h.y + w.z * h.z, 5e-26f), mm = dot(m, m), hh = dot(h, h);
   const float rho = 2 * im / mm;
   Sample s{{rho * m.x - i.x, rho * m.y - i.y, rho * m.z - i.z}, 0, 0};
-  if (exact) s.o.z = std::max(s.o.z, kHorizon);  // rounding alone could put it below
+  if (exact) s.o.z = std::max(s.o.z, kHorizon);  // rounding could put it below
   if (!(s.o.z > 0)) return s;
   const float q = mm / hh;  // pi ax ay D = (M.M)^2 / |m_hat|^4
   s.pdf = std::min(q * q / (2 * kPi * ax * ay * two_n), 3e38f);

@@ -166,7 +166,7 @@ class NpzInput final : public InputTable {
       const auto index = static_cast<zip_uint64_t>(k);
       if (zip_stat_index(zip.get(), index, 0, &stat) != 0) return invalid("{}: {}", path, zip_strerror(zip.get()));
       std::string name = stat.name;
-      if (!name.ends_with(".npy")) return invalid("{}: {} in it is no .npy file", path, name);
+      if (!name.ends_with(".npy")) return invalid("{}: {} in it is not a .npy file", path, name);
       constexpr zip_uint64_t kLargestArray = zip_uint64_t{1} << 34;
       if (stat.size > kLargestArray) return invalid("{}: {} in it has {} bytes, too many", path, name, stat.size);
       std::string& bytes = bytes_.emplace_back(stat.size, '\0');
@@ -174,7 +174,7 @@ class NpzInput final : public InputTable {
       if (!file || zip_fread(file.get(), bytes.data(), bytes.size()) != static_cast<zip_int64_t>(bytes.size()))
         return invalid("{}: {} in it cannot be read: {}", path, name, zip_strerror(zip.get()));
       name.resize(name.size() - 4);
-      auto columns = NpyColumns::read(path + ", " + name, bytes, std::span(&name, 1));
+      auto columns = NpyColumns::read(fmt::format("{}, {}", path, name), bytes, std::span(&name, 1));
       if (!columns.ok()) return columns.status();
       if (!arrays_.empty() && columns->header().rows != rows())
         return invalid("{}: {} has {} values, {} has {}", path, name, columns->header().rows, names_.front(), rows());

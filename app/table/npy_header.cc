@@ -117,7 +117,7 @@ std::size_t elements(const Literal& shape) {
   return count;
 }
 
-// Bytes of a value of a type such as "<f4"; nothing for Python objects and what is no type.
+// Bytes of a value of a type such as "<f4"; nothing for Python objects and for what is not a type.
 std::optional<std::size_t> type_bytes(std::string_view type) {
   if (type.size() < 3 || std::string_view("<>|=").find(type[0]) == std::string_view::npos) return std::nullopt;
   if (std::string_view("?bhilqBHILQefdgFDGSaUVMmcfiu").find(type[1]) == std::string_view::npos) return std::nullopt;
@@ -223,7 +223,7 @@ absl::StatusOr<NpyHeader> parse_npy_header(std::string_view file, std::span<cons
     const bool fortran = order != nullptr && order->integer != 0;
     if (auto status = read_array(*descr, *shape, fortran, names, header, data_bytes); !status.ok()) return status;
   } else {
-    if (descr->kind != Literal::Kind::list) return invalid("malformed header: descr is no type");
+    if (descr->kind != Literal::Kind::list) return invalid("malformed header: descr is not a type");
     if (!names.empty()) return invalid("it names its columns itself; --columns is for plain arrays");
     if (auto status = read_fields(*descr, header); !status.ok()) return status;
     if (shape->items.size() != 1)

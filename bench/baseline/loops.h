@@ -116,7 +116,7 @@ std::uint64_t run_sampler(const Loop& loop) {
     case Operation::evaluate_reflection:
       return loop.pdf == nullptr ? query<model, sampler, true, false>(loop) : query<model, sampler, true, true>(loop);
     case Operation::masking: return mask<model>(loop);
-    default: return 0;  // there are none of dielectrics
+    default: return 0;  // not for dielectrics
   }
 }
 

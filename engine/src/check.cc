@@ -122,8 +122,9 @@ absl::Status check_outputs(Operation operation, const Batch& batch, const BatchC
     if (!(fields[k].operations & bit(operation)))
       return invalid(field, absl::StrCat(view(name(operation)), " does not compute it"));
     if (!computes(operation, batch.model, fields[k]))
-      return invalid(field, k == kOutShare ? "known in closed form for ggx with smith masking only"
-                                           : "depends on the normal with vcavity masking");
+      return invalid(field, k == kOutShare         ? "known in closed form for ggx with smith masking only"
+                            : k == kOutTransmitted ? "needs a dielectric interface"
+                                                   : "depends on the normal with vcavity masking");
     if (auto status = check_output(field, column, batch.lanes); !status.ok()) return status;
   }
   for (std::size_t k = 0; k < kByteOutputs; ++k) {

@@ -165,8 +165,6 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
   const bool asymmetric = skewed || batch.mean_slope_x.present() || batch.mean_slope_y.present();
   constexpr absl::string_view kSymmetric =
       "needs normals that are distributed symmetrically about n: no mean slope, a radial table";
-  if (operation == Operation::albedo && model.interface == Interface::dielectric)
-    return invalid("model.interface", "albedo is that of F = 1: a conductor or schlick");
   if (operation == Operation::albedo && asymmetric)
     return invalid(skewed                         ? "model.table"
                    : batch.mean_slope_x.present() ? "mean_slope_x"
@@ -174,8 +172,9 @@ absl::Status check_composition(Operation operation, const Batch& batch) {
                    absl::StrCat("albedo ", kSymmetric));
   if (model.compensation != Compensation::none) {
     const absl::string_view compensation = named(model.compensation);
-    if (model.interface == Interface::dielectric)
-      return invalid("model.compensation", absl::StrCat(compensation, " needs a conductor or schlick interface"));
+    if (model.interface == Interface::dielectric && model.compensation == Compensation::kelemen)
+      return invalid("model.compensation",
+                     "kelemen needs a conductor or schlick interface; turquin takes a dielectric");
     if (asymmetric) return invalid("model.compensation", absl::StrCat(compensation, " ", kSymmetric));
   }
 

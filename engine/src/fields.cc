@@ -64,6 +64,7 @@ unsigned outputs_computed(Operation operation, const Model& model) {
   unsigned bits = kKnownOutputs[static_cast<std::size_t>(operation)];
   if (model.distribution != Distribution::ggx || model.masking != Masking::smith) bits &= ~(1u << kOutShare);
   if (model.masking != Masking::smith) bits &= ~(1u << kOutMasking);
+  if (model.interface != Interface::dielectric) bits &= ~(1u << kOutTransmitted);
   return bits;
 }
 

@@ -21,7 +21,7 @@ inline constexpr unsigned kMasking = bit(masking);
 inline constexpr unsigned kAlbedo = bit(albedo);
 inline constexpr unsigned kEvery = kSample | kQuery | kMasking | kAlbedo;
 inline constexpr unsigned kReflectance = kReflected | bit(evaluate_reflection);
-inline constexpr unsigned kDielectric = kReflectance | kScattered | kSides;
+inline constexpr unsigned kDielectric = kReflectance | kScattered | kSides | kAlbedo;
 inline constexpr unsigned kDirection = kReflected | kScattered;
 inline constexpr unsigned kDensity = kSample | kQuery;
 inline constexpr unsigned kValue = bit(evaluate_reflection) | kSides;
@@ -67,7 +67,8 @@ inline constexpr unsigned kBranch = bit(sample_scattering) | bit(evaluate_scatte
   X(Branch, branch_probability, kBranch) \
   X(EtaScale, eta_scale, kScattered)     \
   X(Albedo, albedo, kAlbedo)             \
-  X(MeanAlbedo, mean_albedo, kAlbedo)
+  X(MeanAlbedo, mean_albedo, kAlbedo)    \
+  X(Transmitted, transmitted, kAlbedo)
 
 #define FACETWISE_BYTE_FIELDS(X) \
   X(Status, status, kEvery)      \

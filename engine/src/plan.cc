@@ -82,7 +82,7 @@ bool streams(const Plan& plan, bool spreads, const Execution& execution) {
 OutputIndex compensated_output(Operation operation, const Model& model, const PresentColumns& columns) {
   if (model.compensation != Compensation::turquin || !reads_albedo(operation, model)) return kOutputs;
   if (operation == Operation::albedo) return kOutputs;
-  const OutputIndex index = operation == Operation::sample_reflection ? kOutWeight : kOutValue;
+  const OutputIndex index = samples(operation) ? kOutWeight : kOutValue;
   return columns.out_bits >> index & 1 ? index : kOutputs;
 }
 
@@ -134,7 +134,9 @@ void make_plan(Operation operation, const Batch& batch, const PresentColumns& co
   plan.constants.importance = model.transport == Transport::importance;
   plan.constants.retro = model.retro;
   // Operations without reflectances do not read its columns.
-  if (known_to::kDielectric & bit(operation)) plan.constants.interface = model.interface;
+  if ((known_to::kDielectric & bit(operation)) &&
+      (operation != Operation::albedo || model.interface == Interface::dielectric))
+    plan.constants.interface = model.interface;
   plan.constants.table = model.table ? &model.table->view() : nullptr;
   if (plan.compensated != kOutputs) {
     plan.compensation = find_surface(table, model, affine).compensation;

@@ -28,7 +28,7 @@ struct Plan {
   OutputIndex compensated = kOutputs;  // what its factors are for; kOutputs: there is none
   // Kelemen's lobe: before and after `kernel`, and the model's own query of what the lobe has drawn.
   Kernel lobe = nullptr, with_lobe = nullptr, lobe_query = nullptr;
-  bool buffers = false;                // some column goes by way of buffers in every tile
+  bool buffers = false;  // some column goes by way of buffers in every tile
 
   // The columns that there are, by the tile's indices.
   struct Input {

@@ -66,11 +66,11 @@ struct Tile : TileConstants {
   std::size_t lanes = 0;
   unsigned streamed = 0;                // as `wanted`: stored past the caches; those begin at a cache line
   std::uint8_t* status = nullptr;       // null unless wanted
-  std::uint8_t* event = nullptr;        // likewise
+  std::uint8_t* event = nullptr;        // null unless wanted
   const float* in[kInputs];             // those that the operation reads, the optional ones too
   float* out[kOutputs];                 // the wanted ones
   float* factor = nullptr;              // of compensation: what it computes
-  float* lobe[kLobeColumns];            // likewise
+  float* lobe[kLobeColumns];            // of compensation by a lobe
   std::size_t ahead_count = 0;          // for kernels that fetch ahead
   const float* const* ahead = nullptr;  // columns, as far ahead as each is fetched
 };

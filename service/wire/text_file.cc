@@ -39,7 +39,7 @@ absl::StatusOr<std::vector<std::string>> read_tokens(const std::string& path) {
                                                      " characters, not ", kShortest, " to ", kLongest));
     tokens.emplace_back(line);
   }
-  if (tokens.empty()) return absl::InvalidArgumentError(absl::StrCat(path, ": there is no token in it"));
+  if (tokens.empty()) return absl::InvalidArgumentError(absl::StrCat(path, ": has no token"));
   return tokens;
 }
 

@@ -7,7 +7,7 @@
 namespace facetwise::test {
 namespace {
 
-// Runs with --output on a file that exists: it must be left as it was, and alone.
+// Runs with --output on a file that exists: it must be left as it was, with nothing beside it.
 void expect_failure(std::vector<std::string> arguments, const std::string& input, const std::string& message,
                     int code = 1) {
   SCOPED_TRACE(message);

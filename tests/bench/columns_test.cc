@@ -48,7 +48,7 @@ TEST(Columns, OthersAreWhereMallocPutsThem) {
   EXPECT_EQ(place(placed.out.pdf.data()), 16u);
 }
 
-// All that a case can be run by, on the same lanes: the same results but for rounding.
+// All that a case can be run by, on the same lanes: the same results up to rounding.
 TEST(Columns, ImplementationsAgree) {
   constexpr std::size_t kLanes = 4096;
   auto columns = Columns::make(kLanes);

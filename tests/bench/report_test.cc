@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Every number is finite (JSON has no others, so that they would be null) and no field is null, but for those
+// Every number is finite (JSON has no others, so that they would be null) and no field is null, except those
 // named.
 void expect_no_null(const Json& json, const std::set<std::string>& may_be_null, const std::string& path = "") {
   if (json.is_structured()) {

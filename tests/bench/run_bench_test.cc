@@ -61,7 +61,7 @@ TEST(RunBench, MeasuresWhatItIsAskedFor) {
     EXPECT_EQ(r.share_of_fma > 0, r.implementation != "remote") << r.name();
     rejected[r.sampler][r.implementation] = r.rejected;
   }
-  // The same lanes: the same rejections, but for the baseline's rounding.
+  // The same lanes: the same rejections, up to the baseline's rounding.
   auto& cap = rejected["cap"];
   EXPECT_GT(cap["simd"], 400u);
   EXPECT_LT(cap["simd"], 900u);

@@ -59,7 +59,7 @@ TEST(HardLanes, AnyOrder) {
   }
 }
 
-// As a value, or as memory of one value: each input alone, the incident direction, all but one, all.
+// As a value, or as memory of one value: each input by itself, the incident direction, all but one, all.
 TEST(HardLanes, OneValueForAllLanes) {
   const Lanes lanes = hard_lanes(Kind::mixed, 700, 28);
   const auto fields = input_fields();
@@ -81,7 +81,7 @@ TEST(HardLanes, OneValueForAllLanes) {
     }
 }
 
-// One output at a time, the status alone, and none at all, which still counts.
+// One output at a time, only the status, and none at all, which still counts.
 TEST(HardLanes, OneOutput) {
   const Lanes lanes = hard_lanes(Kind::mixed, 600, 29);
   const auto fields = output_fields();

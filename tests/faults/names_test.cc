@@ -63,7 +63,7 @@ TEST(Names, FieldTables) {
     EXPECT_NE(field.operations, 0u);
   }
   EXPECT_EQ(input_fields().size(), 17u);
-  EXPECT_EQ(output_fields().size(), 17u);
+  EXPECT_EQ(output_fields().size(), 18u);
   EXPECT_EQ(byte_fields().size(), 2u);
 }
 

@@ -21,8 +21,12 @@ inline void make_albedo_tables() {
       model.shadowing = shadowing;
       AlbedoTable::Options options;
       options.sizes = {2, 2, 2, 2, 2, 2};
+      options.dielectric_sizes = {2, 2, 0, 0, 0, 0, 3};
       options.samples = 2;
-      if (auto table = AlbedoTable::build(model, options); table.ok()) use_albedo_table(*table);
+      for (const Interface interface : {Interface::conductor, Interface::dielectric}) {
+        model.interface = interface;
+        if (auto table = AlbedoTable::build(model, options); table.ok()) use_albedo_table(*table);
+      }
     }
 }
 

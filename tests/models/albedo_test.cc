@@ -18,7 +18,9 @@ namespace {
 
 using reference::Vector;
 
-AlbedoTable::Options small() { return {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4}; }
+AlbedoTable::Options small() {
+  return {.sizes = {17, 9, 5, 5, 3, 3}, .dielectric_sizes = {9, 5, 0, 0, 0, 0, 9}, .samples = 4};
+}
 
 void use_table(const Model& model, const AlbedoTable::Options& options) {
   const auto table = AlbedoTable::build(model, options);
@@ -365,6 +367,115 @@ TEST_P(Albedo, KelemensSamples) {
   }
 }
 
+// What a dielectric's table may be wrong by (docs/albedo.md): both together, and the reflected or transmitted part.
+struct DielectricTolerance {
+  double both, part;
+  double seldom;  // what nine lanes in ten keep to, part
+  double both_compensated() const { return std::min(both, 0.15); }
+};
+DielectricTolerance dielectric_tolerance(float eta, bool isotropic) {
+  if (isotropic) return eta > 1 ? DielectricTolerance{0.005, 0.1, 0.01} : DielectricTolerance{0.02, 0.1, 0.02};
+  return {0.7, 0.7, 0.2};
+}
+
+// Reflected and transmitted albedo are the mean weights of other samples; together with them, compensated, all light
+// comes back or goes through.
+TEST_P(Albedo, OfADielectric) {
+  if (kQuick) return;
+  for (Model model : models()) {
+    model.interface = Interface::dielectric;
+    model.transport = Transport::importance;
+    // All that is different is the table.
+    if (model.shadowing == Shadowing::uncorrelated) continue;
+    use_table(model, {});
+    std::vector<float> weight(1 << 14);
+    for (const bool isotropic : {true, false}) {
+      const Places at = places(model, 100, isotropic, isotropic ? 13 : 14, 1e-4, kSmallestAlpha, 2);
+      std::mt19937_64 random(5);
+      std::vector<float> eta(at.size()), reflected(at.size()), transmitted(at.size()), mean(at.size());
+      for (float& e : eta) {
+        const double u = static_cast<double>(random() >> 11) * 0x1p-53;
+        e = static_cast<float>(random() % 2 == 0 ? 1 + 1.5 * u : 1 / (1 + 1.5 * u));
+      }
+      Batch batch = at.batch(model);
+      batch.eta = eta;
+      batch.out.albedo = reflected;
+      batch.out.transmitted = transmitted;
+      ASSERT_TRUE(facetwise::albedo(batch).ok());
+      std::size_t off = 0;
+      for (std::size_t n = 0; n < at.size(); ++n) {
+        const DielectricTolerance tolerance = dielectric_tolerance(eta[n], isotropic);
+        const auto mean_of = [&](Operation operation, Compensation compensation) {
+          Batch one;
+          one.model = model;
+          one.model.compensation = compensation;
+          one.eta = eta[n];
+          one.sampler = default_sampler(operation, one);
+          one.lanes = weight.size();
+          one.incident = {at.x[n], at.y[n], at.z[n]};
+          one.alpha_x = at.alpha_x[n];
+          one.alpha_y = at.alpha_y[n];
+          one.generator = {.seed = n};
+          one.out.weight = weight;
+          const auto statistics = run(operation, one);
+          EXPECT_TRUE(statistics.ok()) << statistics.status();
+          double sum = 0, squares = 0;
+          for (const float w : weight) sum += w, squares += static_cast<double>(w) * w;
+          const double count = static_cast<double>(weight.size()), value = sum / count;
+          return Mean{value, std::sqrt(std::max(0.0, squares / count - value * value) / count)};
+        };
+        const Mean r = mean_of(Operation::sample_reflection, Compensation::none);
+        const Mean t = mean_of(Operation::sample_transmission, Compensation::none);
+        const Mean both = mean_of(Operation::sample_scattering, Compensation::turquin);
+        const double sum = r.value + t.value;
+        EXPECT_NEAR(reflected[n], r.value, tolerance.part + 5 * r.deviation) << at.describe(n) << " eta " << eta[n];
+        EXPECT_NEAR(transmitted[n], t.value, tolerance.part + 5 * t.deviation) << at.describe(n) << " eta " << eta[n];
+        EXPECT_NEAR(reflected[n] + transmitted[n], sum, tolerance.both + 5 * (r.deviation + t.deviation))
+            << at.describe(n) << " eta " << eta[n];
+        // The compensation of anisotropic roughness is less than all that is lost.
+        const double noise = 5 * both.deviation;
+        EXPECT_LE(both.value, 1 + tolerance.both_compensated() + noise) << at.describe(n) << " eta " << eta[n];
+        EXPECT_GE(both.value, (isotropic ? 1 - tolerance.both : sum - 5 * (r.deviation + t.deviation)) - noise - 1e-3)
+            << at.describe(n) << " eta " << eta[n];
+        off += std::max(std::abs(reflected[n] - r.value), std::abs(transmitted[n] - t.value)) > tolerance.seldom;
+      }
+      EXPECT_LE(off, at.size() / 10) << isotropic;
+    }
+  }
+}
+
+// Smooth lanes, and those with eta = 1, have Fresnel's shares.
+TEST_P(Albedo, OfASmoothDielectric) {
+  Model model = models().front();
+  model.interface = Interface::dielectric;
+  use_table(model, small());
+  const float eta[] = {1.5f, 1, 1.5f, 1.5f, -1}, alpha[] = {0, 0.5f, -1, 1e-5f, 0.5f};
+  float albedo[5], transmitted[5], mean[5];
+  std::uint8_t status[5];
+  Batch batch;
+  batch.model = model;
+  batch.lanes = 5;
+  batch.incident = {0.0f, 0.0f, 1.0f};
+  batch.eta = eta;
+  batch.alpha_x = batch.alpha_y = alpha;
+  batch.out.albedo = albedo;
+  batch.out.transmitted = transmitted;
+  batch.out.mean_albedo = mean;
+  batch.out.status = status;
+  const auto statistics = facetwise::albedo(batch);
+  ASSERT_TRUE(statistics.ok()) << statistics.status();
+  EXPECT_EQ(*statistics, (Statistics{.smooth = 3, .invalid = 2}));
+  for (const int lane : {0, 3}) {
+    EXPECT_NEAR(albedo[lane], 0.04f, 1e-6f);
+    EXPECT_NEAR(transmitted[lane], 0.96f, 1e-6f);
+    EXPECT_GT(mean[lane], 0.05f);
+  }
+  EXPECT_EQ(albedo[1], 0);
+  EXPECT_EQ(transmitted[1], 1);
+  EXPECT_EQ(mean[1], 0);
+  for (const int lane : {2, 4}) EXPECT_EQ(albedo[lane] + transmitted[lane] + mean[lane], 0);
+}
+
 TEST_P(Albedo, PolicyForLanes) {
   const Model model = models().front();
   use_table(model, small());
@@ -430,8 +541,10 @@ TEST(AlbedoTables, CorrelatedRoughness) {
   EXPECT_NEAR(turned, straight, 1e-5);
 }
 
-TEST(AlbedoTables, FilesKeepThem) {
-  Model model{.distribution = Distribution::beckmann, .shadowing = Shadowing::uncorrelated};
+class AlbedoFiles : public testing::TestWithParam<Interface> {};
+
+TEST_P(AlbedoFiles, KeepTables) {
+  Model model{.distribution = Distribution::beckmann, .shadowing = Shadowing::uncorrelated, .interface = GetParam()};
   double told = 0;
   AlbedoTable::Options options = small();
   options.progress = [&](double done) {
@@ -442,8 +555,12 @@ TEST(AlbedoTables, FilesKeepThem) {
   ASSERT_TRUE(table.ok()) << table.status();
   EXPECT_GE(told, 0.98);
   EXPECT_TRUE((*table)->fits(model));
-  EXPECT_EQ((*table)->description(), "beckmann with smith masking, uncorrelated shadowing");
-  model.shadowing = Shadowing::correlated;
+  EXPECT_EQ((*table)->description(), std::string("beckmann with smith masking, uncorrelated shadowing") +
+                                         (GetParam() == Interface::dielectric ? ", dielectric" : ""));
+  Model other = model;
+  other.shadowing = Shadowing::correlated;
+  EXPECT_FALSE((*table)->fits(other));
+  model.interface = GetParam() == Interface::dielectric ? Interface::schlick : Interface::dielectric;
   EXPECT_FALSE((*table)->fits(model));
 
   const std::string path = std::filesystem::temp_directory_path() / "facetwise_albedo_test.table";
@@ -466,6 +583,9 @@ TEST(AlbedoTables, FilesKeepThem) {
   }
 }
 
+INSTANTIATE_TEST_SUITE_P(Interfaces, AlbedoFiles, testing::Values(Interface::conductor, Interface::dielectric),
+                         [](const auto& info) { return std::string(name(info.param)); });
+
 TEST(AlbedoTables, OfATableOfSlopes) {
   const auto density = [](double x, double y) { return std::exp(-x * x - y * y); };
   const auto slopes =
@@ -477,7 +597,7 @@ TEST(AlbedoTables, OfATableOfSlopes) {
   ASSERT_TRUE(a.ok()) << a.status();
   ASSERT_TRUE(b.ok()) << b.status();
   EXPECT_NE((*a)->key(), (*b)->key());
-  // The same density: the same albedo, but for what the table rounds and other samples.
+  // The same density: the same albedo, up to what the table rounds and other samples.
   for (std::size_t k = 0; k < small().sizes.isotropic(); ++k)
     EXPECT_NEAR((*a)->view().isotropic[k], (*b)->view().isotropic[k], 0.03) << k;
 }
@@ -488,6 +608,8 @@ TEST(AlbedoTables, Refusals) {
     EXPECT_TRUE(std::string(status.message()).starts_with(start)) << status;
   };
   refused(AlbedoTable::build({}, {.sizes = {.v = 1}}).status(), "sizes: ");
+  refused(AlbedoTable::build({}, {.sizes = kDielectricAlbedo}).status(), "sizes: ");
+  refused(AlbedoTable::build({.interface = Interface::dielectric}, {.dielectric_sizes = {}}).status(), "sizes: ");
   refused(AlbedoTable::build({}, {.samples = 3}).status(), "samples: ");
   refused(AlbedoTable::build({.distribution = Distribution::phong}, small()).status(), "model.masking: ");
   Batch batch;
@@ -499,9 +621,12 @@ TEST(AlbedoTables, Refusals) {
   batch.mean_slope_x = 0.1f;
   refused(facetwise::albedo(batch).status(), "mean_slope_x: ");
   batch.mean_slope_x = {};
+  batch.out.transmitted = {&albedo, 1};
+  refused(facetwise::albedo(batch).status(), "out.transmitted: ");
+  batch.out.transmitted = {};
   batch.model.interface = Interface::dielectric;
-  refused(facetwise::albedo(batch).status(), "model.interface: ");
-  batch.model.compensation = Compensation::turquin;
+  refused(facetwise::albedo(batch).status(), "eta: ");
+  batch.model.compensation = Compensation::kelemen;
   refused(check(Operation::sample_scattering, batch), "model.compensation: ");
   batch.model.interface = Interface::conductor;
   batch.model.compensation = static_cast<Compensation>(9);

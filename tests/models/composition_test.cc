@@ -166,7 +166,7 @@ const Moment kMoments[] = {{"mean_slope_x", &Batch::mean_slope_x},
                            {"mean_slope_y", &Batch::mean_slope_y},
                            {"slope_correlation", &Batch::slope_correlation}};
 
-// Moments are Smith's, with ggx and beckmann.
+// Only Smith takes mean slopes and correlation, with ggx and beckmann.
 TEST(ModelRefusals, MomentsAreRefusedByTheOthers) {
   for (const Family& family : families()) {
     if (family.affine || (family.masking == Masking::smith && family.distribution != Distribution::student_t)) continue;

@@ -92,14 +92,14 @@ reference::Vector normal_of(const reference::Surface& surface, double r, double 
 
 // Ordinary lanes of a family that look for trouble: front, behind, grazing, straight up and nearly straight
 // down; alpha from 1e-3 to the distribution's largest, half of them isotropic; o anywhere, a reflection by a
-// visible normal, the mirror direction, and grazing; u also at 0 and at the largest below 1. Moments are
+// visible normal, the mirror direction, and grazing; u also at 0 and at the largest below 1. Mean slopes and correlations are
 // moderate, or with `extreme` up to a mean slope of 100 and a correlation of 0.999. Mean slopes are 0 for a
 // model with retro.
 std::vector<Point> hard_points(const Composition& composition, std::size_t count, std::uint64_t seed,
                                bool extreme = false);
 // The same for dielectrics: two thirds of the o are transmissions, where there are any.
 std::vector<Point> scattering_points(const Composition& composition, std::size_t count, std::uint64_t seed);
-// A handful of well-conditioned points for integrals: front, behind, anisotropic; with moments where the
+// A handful of well-conditioned points for integrals: front, behind, anisotropic; with mean slopes where the
 // family has them.
 std::vector<Point> calm_points(const Composition& composition);
 // Visible normals of Student-t with Smith masking next to straight up, where i.m is known to be wrong:

@@ -242,7 +242,7 @@ void compare(Operation operation, const Model& model, Sampler sampler, std::size
     batch.lanes = lanes;
     for (const InputField& field : input_fields()) {
       const auto index = static_cast<std::size_t>(&field - input_fields().data());
-      // The table's order: i, alpha, moments and interface (none here), o, u.
+      // The table's order: i, alpha, mean slopes and interface (none here), o, u.
       constexpr int kNone = -1;
       constexpr int kOrder[] = {kIx,   kIy,   kIz, kAlphaX, kAlphaY, kNone, kNone, kNone, kNone,
                                 kNone, kNone, kOx, kOy,     kOz,     kU1,   kU2,   kU3};

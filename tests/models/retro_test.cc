@@ -17,7 +17,7 @@ Composition without(Composition c) {
   return c;
 }
 
-// The composition without moments, or with a correlation alone: the same columns with and without retro.
+// The composition without mean slopes, or with only a correlation: the same columns with and without retro.
 std::vector<Point> without_mean(std::vector<Point> points) {
   for (Point& p : points) p.mean_x = p.mean_y = 0;
   return points;
@@ -42,7 +42,7 @@ TEST_P(ModelRetro, IsTheTurnedIncidence) {
                               turned = run_points(Operation::evaluate_reflection, without(c), plain);
     std::size_t lit = 0;
     for (std::size_t n = 0; n < points.size(); ++n) {
-      // Straight up, the azimuth that some samplers go by is no turned one.
+      // Straight up, the azimuth that some samplers go by is not turned.
       if (points[n].ix == 0 && points[n].iy == 0) continue;
       ASSERT_EQ(retro[n].value, turned[n].value) << describe(c) << describe(points[n]);
       ASSERT_EQ(retro[n].pdf, turned[n].pdf) << describe(c) << describe(points[n]);

@@ -133,7 +133,7 @@ TEST_P(Tables, SamplesAgreeWithQueriesAndFollowTheirDensity) {
     const Composition c = composition(GetParam(), sampler);
     std::uint64_t seed = 40;
     for (const Point& point : calm_points(c)) {
-      // A sample's pdf is a query's, but for neighbours of cells' ends; its weight times that is the value.
+      // A sample's pdf is a query's, except beside cells' ends; its weight times that is the value.
       std::vector<Point> points = with_random(point, kQuick ? 200 : 4000, ++seed);
       const auto samples = run_table(Operation::sample_reflection, c, points);
       for (std::size_t n = 0; n < points.size(); ++n)

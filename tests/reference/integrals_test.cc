@@ -21,7 +21,7 @@ double length_stretched(Roughness alpha, Vector i) {
   return std::sqrt(alpha.x * alpha.x * i.x * i.x + alpha.y * alpha.y * i.y * i.y + i.z * i.z);
 }
 
-// Which share of a sampler's samples is accepted, from K alone: the density of every visible-normal sampler
+// Which share of a sampler's samples is accepted, from only K: the density of every visible-normal sampler
 // is D(m) / (4 N) with its own N, so that the share is K / N.
 double share_accepted(Sampler sampler, Roughness alpha, Vector i) {
   if (i.z <= 0) return 1;

@@ -138,7 +138,7 @@ TEST(Furnace, BasesTakeWhatTheSurfaceLeaves) {
   }
 }
 
-// Light comes back from a plate of glass too, but for what single scattering loses each time: a smooth one loses none.
+// Light comes back from a plate of glass too, except what single scattering loses each time: a smooth one loses none.
 TEST(Furnace, GlassLosesNothingButMultipleScattering) {
   const auto engine = local_engine();
   for (const bool light_sampling : {false, true}) {

@@ -107,7 +107,7 @@ TEST(SamePicture, SeedsDiffer) {
   EXPECT_FALSE(same(*one, *two));
 }
 
-// What users of the scalar baseline would see: the same picture but for rounding and the order of its numbers.
+// What users of the scalar baseline would see: the same picture up to rounding and the order of its numbers.
 TEST(SamePicture, TheScalarBaselineDiffersByNoiseOnly) {
   Scene scene = scene_of("orbs");
   scene.materials.erase(scene.materials.begin());  // alpha = 0.01: too bright and rare a highlight for so few samples

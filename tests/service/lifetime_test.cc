@@ -98,7 +98,7 @@ TEST_F(Lifetime, AddressesThatCannotBeListenedOnAreRefused) {
     EXPECT_NE(server.errors().find(message), std::string::npos) << server.errors();
   };
   std::ofstream(folder_.path("file")) << "precious";
-  expect_refused({"--listen", "unix:" + folder_.path("file")}, "there is a file of that name that is no socket");
+  expect_refused({"--listen", "unix:" + folder_.path("file")}, "a file of that name is not a socket");
   std::string text;
   std::ifstream(folder_.path("file")) >> text;
   EXPECT_EQ(text, "precious");

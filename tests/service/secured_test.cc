@@ -72,7 +72,7 @@ absl::Status call(const std::string& address, ConnectOptions options) {
   EXPECT_TRUE(!status.ok() || (value > 0.5f && value <= 1));
   return status;
 }
-// Until it is so, but for a while only: files are read again within a second.
+// Until it is so, for a while: files are read again within a second.
 template <class Condition>
 bool becomes(const Condition& condition) {
   for (int n = 0; n < 60; ++n) {

@@ -73,7 +73,7 @@ float uniform(std::uint64_t seed, std::uint64_t index) {
 bool is_plain(const Call& call) {
   return call.model.distribution == Distribution::ggx && call.model.masking == Masking::smith &&
          call.model.interface == Interface::conductor && call.model.normalisation == Normalisation::unbiased &&
-         !call.model.retro && call.model.compensation == Compensation::none && !call.moments;
+         !call.model.retro && call.model.compensation == Compensation::none && !call.affine;
 }
 
 namespace {
@@ -87,9 +87,9 @@ bool reads(const Call& call, const InputField& field) {
   if (!(field.operations & bit(call.operation))) return false;
   if (field.name == "eta") return call.model.interface == Interface::dielectric;
   if (field.name == "f0" || field.name == "f90") return call.model.interface == Interface::schlick;
-  if (field.name == "slope_correlation") return call.moments && !is_skewed(call.model);
+  if (field.name == "slope_correlation") return call.affine && !is_skewed(call.model);
   // What Raab's back-vector does needs slopes that are symmetric about n.
-  if (field.name.starts_with("mean_slope")) return call.moments && !call.model.retro;
+  if (field.name.starts_with("mean_slope")) return call.affine && !call.model.retro;
   return true;
 }
 
@@ -115,7 +115,7 @@ std::string call_name(const Call& call) {
   if (model.transport != Transport::radiance) append(model.transport);
   if (model.compensation != Compensation::none) append(model.compensation);
   if (model.retro) text += "/retro";
-  if (call.moments) text += "/moments";
+  if (call.affine) text += "/affine";
   return text;
 }
 
@@ -158,16 +158,16 @@ bool fits(const Call& call) {
   return check(call.operation, make_batch(call, lanes, answer)).ok();
 }
 
-void add_model(const Model& model, bool moments, std::vector<Call>& calls, std::set<std::string>& names) {
+void add_model(const Model& model, bool affine, std::vector<Call>& calls, std::set<std::string>& names) {
   std::size_t turn = calls.size();
   for (const Operation operation : all_operations()) {
     if (operation == Operation::albedo) continue;  // below
     Model varied = model;
     if (operation >= Operation::sample_transmission) varied.interface = Interface::dielectric;
     const auto add = [&](Sampler sampler, bool values_alone) {
-      Call call{operation, sampler, Shadowing::correlated, varied, moments, values_alone};
+      Call call{operation, sampler, Shadowing::correlated, varied, affine, values_alone};
       vary(call, ++turn);
-      if (moments && !fits(call)) return;
+      if (affine && !fits(call)) return;
       if (names.insert(call_name(call)).second) calls.push_back(call);  // those of plain GGX are there
     };
     if (operation == Operation::evaluate_reflection) add(Sampler::visible, true);
@@ -203,6 +203,16 @@ void add_with_lobe(const Model& model, std::size_t turn, std::vector<Call>& call
   calls.push_back(call);
 }
 
+// Albedo of a dielectric, or one of the operations that it compensates.
+void add_dielectric_albedo(Model model, std::size_t turn, std::vector<Call>& calls) {
+  constexpr Operation kOperations[] = {Operation::albedo, Operation::sample_scattering, Operation::evaluate_scattering,
+                                       Operation::sample_transmission, Operation::evaluate_reflection};
+  const Operation operation = kOperations[turn % std::size(kOperations)];
+  model.interface = Interface::dielectric;
+  if (operation != Operation::albedo) model.compensation = Compensation::turquin;
+  calls.push_back({operation, Sampler::visible, Shadowing::correlated, model});
+}
+
 // Small tables, quick to build wherever tests run, each when it is first needed: an emulator takes a second for all.
 void keep_small_albedo_table(const Model& model) {
   static std::mutex mutex;
@@ -210,7 +220,8 @@ void keep_small_albedo_table(const Model& model) {
   const std::lock_guard lock(mutex);
   const AlbedoTable::Key key = AlbedoTable::key_of(model);
   if (std::find(kept.begin(), kept.end(), key) != kept.end()) return;
-  const auto table = AlbedoTable::build(model, {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4});
+  const auto table = AlbedoTable::build(
+      model, {.sizes = {17, 9, 5, 5, 3, 3}, .dielectric_sizes = {9, 5, 0, 0, 0, 0, 9}, .samples = 4});
   if (!table.ok()) return;  // calls say why
   use_albedo_table(*table);
   kept.push_back(key);
@@ -264,6 +275,9 @@ std::vector<Call> make_all_calls() {
   for (const auto& models : {all_models(), tabulated_models()})
     for (const Model& model : models)
       if (!is_skewed(model)) add_with_lobe(model, turn++, calls);
+  for (const auto& models : {all_models(), tabulated_models()})
+    for (const Model& model : models)
+      if (!is_skewed(model)) add_dielectric_albedo(model, turn++, calls);
 #ifdef FACETWISE_QUICK
   // For an emulator: all of plain GGX, and of the models every seventh; but of Phong's, which take it seconds each, one.
   const std::size_t plain = plain_calls().size();

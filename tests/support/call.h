@@ -22,7 +22,7 @@ struct Call {
   Sampler sampler;
   Shadowing shadowing;
   Model model{};              // but for its shadowing
-  bool moments = false;       // mean slopes and correlated roughness too
+  bool affine = false;       // mean slopes and correlated roughness too
   bool values_alone = false;  // evaluate_reflection without its pdf, for which the sampler is not read
 };
 std::string call_name(const Call& call);

@@ -16,7 +16,7 @@ struct ChiSquare {
 };
 
 // Cells that expect less than `smallest` are pooled. Both spans have one value per cell, every sample is in
-// one of the cells, and sum(expected) = sum(counts) but for rounding.
+// one of the cells, and sum(expected) = sum(counts) up to rounding.
 ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const double> expected, double smallest = 10);
 
 // The level of each of `tests` independent tests with which any of them fails a right hypothesis with

@@ -15,7 +15,7 @@ inline constexpr bool kQuick = false;
 // FACETWISE_LONG=1 in the environment: the runs that take minutes.
 inline bool long_run() {
   const char* value = std::getenv("FACETWISE_LONG");
-  return value != nullptr && std::string_view(value) != "" && std::string_view(value) != "0";
+  return value != nullptr && !std::string_view(value).empty() && std::string_view(value) != "0";
 }
 
 }  // namespace facetwise::test

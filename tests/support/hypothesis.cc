@@ -64,7 +64,7 @@ Verdict test_hypotheses(const Draw& what, const std::vector<Hypothesis>& hypothe
   std::vector<Cells> all;
   for (const Hypothesis& hypothesis : hypotheses) all.push_back(make_cells(hypothesis, what.count));
 
-  // A sample's normal is the half vector of i and o. Where o's rounding to float alone would move that by
+  // A sample's normal is the half vector of i and o. Where o's mere rounding to float would move that by
   // more than 3e-4 of the lobe, it is the normal that the kernel returns with o; that o is its reflection is
   // checked.
   const double alpha = std::min(what.alpha.x, what.alpha.y);

@@ -98,7 +98,7 @@ TEST(Sampling, DensityIntegratesToOne) {
       }
 }
 
-// But for where rounding puts a slope into the next cell.
+// Except where rounding puts a slope into the next cell.
 TEST(Sampling, DrawnDensityIsTheQueried) {
   for (const SlopeTable* table : {&ggx_table(), &beckmann_table(), &skewed_table()}) {
     int apart = 0, all = 0;

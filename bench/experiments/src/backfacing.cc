@@ -103,8 +103,8 @@ constexpr Composition kCompositions[] = {{Distribution::beckmann, Masking::smith
                                          {Distribution::beckmann, Masking::vcavity, "c"}};
 
 // The integral of the older density over all normals: its ratio to the one that integrates to 1, at any normal.
-absl::StatusOr<std::vector<float>> integrals(Model model, std::vector<float> x, std::vector<float> y,
-                                             std::vector<float> z, float alpha) {
+absl::StatusOr<std::vector<float>> integrals(const Model& model, const std::vector<float>& x,
+                                             const std::vector<float>& y, const std::vector<float>& z, float alpha) {
   const std::size_t lanes = x.size();
   std::vector<float> ox(lanes), oy(lanes), oz(lanes), old(lanes), right(lanes);
   Batch batch;
@@ -295,7 +295,7 @@ absl::StatusOr<Page> backfacing_page(const Options& options) {
       "times steeper.",
       "With the older normalisation value and density are both too small, so that their quotient, a sample's weight, "
       "is right "
-      "for another BRDF than the one that light sampling sees. Light is found by scattering alone here."};
+      "for another BRDF than the one that light sampling sees. Light is found only by scattering here."};
   return page;
 }
 

@@ -137,7 +137,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
                    : render::rmse(picture, truth->picture, orb / 5.0, (orb + 1) / 5.0);
   };
   Pictures pictures{
-      "Five orbs, 8 samples a pixel, random numbers, light found by reflection alone",
+      "Five orbs, 8 samples a pixel, random numbers, light found only by reflection",
       "Five metal orbs with roughness 0.01, 0.1, 0.3, 0.6 and 1 in a courtyard. The rougher, the noisier; "
       "the noise falls from cap over bounded to exact.",
       settings.width,
@@ -307,7 +307,7 @@ absl::StatusOr<Page> bounded_page(const Options& options) {
   page.notes = {
       "The text's orb model and light probe are not free; ours are an orb of revolution and the courtyard of Blender's "
       "light probes. The numbers are therefore ours, the comparison the same.",
-      "The text's renderer finds light by reflection alone, as far as it says. Where the environment is sampled too "
+      "The text's renderer finds light only by reflection, as far as it says. Where the environment is sampled too "
       "(as "
       "renderers do), the samplers differ less: both are in the tables.",
       "Energy compensation after Turquin 2019, as in the text, by the engine's tables of albedo."};

@@ -230,7 +230,7 @@ absl::StatusOr<Page> convergence_page(const Options& options) {
        fmt::format("At alpha 0.4 the ratio is {:.2f} at 0.5 rad, {:.2f} at 1 and {:.2f} at 1.5 (Smith).",
                    of(Masking::smith, 0.4f, 0.5), of(Masking::smith, 0.4f, 1), of(Masking::smith, 0.4f, 1.5)),
        agrees(of(Masking::smith, 0.4f, 1) > 1.05 && of(Masking::smith, 0.4f, 1.5) > of(Masking::smith, 0.4f, 1))});
-  // The deviation is no good measure of efficiency where the mean differs: at each angle the larger roughness.
+  // The deviation does not measure of efficiency where the mean differs: at each angle the larger roughness.
   page.claims.push_back(
       {"The larger the roughness, the better they are.",
        fmt::format("At 1 rad the ratio is {:.2f}, {:.2f} and {:.2f} for alpha 0.1, 0.4 and 1 with Smith; {:.2f}, "
@@ -256,7 +256,7 @@ absl::StatusOr<Page> convergence_page(const Options& options) {
   page.notes = {
       "The scene of the figures is not given: ours is a plate of n = 1.5, rough on all six faces, before the courtyard "
       "of "
-      "Blender's light probes. Light is found by scattering alone.",
+      "Blender's light probes. Light is found only by scattering.",
       "Weights of Smith are height-correlated; the text's are not said."};
   return page;
 }

@@ -53,7 +53,7 @@ scene::Mesh lying(scene::Mesh mesh) {
   return mesh;
 }
 
-// Pixels of the plate, but for those near its edge, which the relief moves.
+// Pixels of the plate, except those near its edge, which the relief moves.
 std::vector<std::size_t> interior(const render::FirstHits& hits, int width, int height) {
   constexpr int kMargin = 3;
   std::vector<std::size_t> pixels;
@@ -134,7 +134,7 @@ absl::StatusOr<Page> relief_page(const Options& options) {
   if (auto status = steps.begin("moments of slopes", 4); !status.ok()) return status;
   auto leadr = render_here(*scene, settings, steps);
   if (!leadr.ok()) return leadr.status();
-  if (auto status = steps.begin("mean slopes alone", 4, 2); !status.ok()) return status;
+  if (auto status = steps.begin("only mean slopes", 4, 2); !status.ok()) return status;
   material.mean_slopes_only = true;
   const auto mean_only = render_here(*scene, settings, steps);
   if (!mean_only.ok()) return mean_only.status();
@@ -145,11 +145,11 @@ absl::StatusOr<Page> relief_page(const Options& options) {
   struct {
     const char* name;
     const render::Picture& picture;
-  } const rows[] = {{"moments of slopes", *leadr}, {"mean slopes alone", *mean_only}, {"flat", *plain}};
+  } const rows[] = {{"moments of slopes", *leadr}, {"only mean slopes", *mean_only}, {"flat", *plain}};
   Pictures pictures{
       "A displaced plate of copper from afar",
       "Hills and, within pixels, a finer relief. With moments of slopes the flat plate looks like the geometry; with "
-      "mean slopes alone it is too sharp, and flat it has no hills.",
+      "only mean slopes it is too sharp, and flat it has no hills.",
       settings.width,
       settings.height,
       {}};
@@ -178,7 +178,7 @@ absl::StatusOr<Page> relief_page(const Options& options) {
   page.claims.push_back(
       {"Visible normals of non-centred distributions can be sampled, and fit LEADR mapping.",
        fmt::format("A plate of two triangles with mean slopes, roughness and correlation of each footprint comes to an "
-                   "RMSE of {:.4f} from {} displaced triangles; mean slopes alone to {:.4f}, the flat plate to {:.4f}.",
+                   "RMSE of {:.4f} from {} displaced triangles; only mean slopes to {:.4f}, the flat plate to {:.4f}.",
                    errors[0], triangles, errors[1], errors[2]),
        errors[0] < 0.6 * errors[1] && errors[0] < errors[2] ? Verdict::agrees
        : errors[0] < errors[1]                              ? Verdict::in_part

@@ -215,7 +215,7 @@ absl::StatusOr<Page> wasted_page(const Options& options) {
        agrees(errors[Sampler::visible] < errors[Sampler::ndf])});
   page.notes = {
       "The post's pictures show a scene that is not given; ours is an orb in the courtyard of Blender's light probes.",
-      "Light is found by reflection alone, so that the sampler is all that differs."};
+      "Light is found only by reflection, so that only the sampler differs."};
   return page;
 }
 

@@ -154,10 +154,10 @@ struct BenchProgress {
 // Returns false to stop: run_bench() then returns Cancelled.
 using BenchCallback = std::function<bool(const BenchProgress&)>;
 
-// Runs benchmarks; prints nothing. InvalidArgument for a filter that is no regular expression or matches
+// Runs benchmarks; prints nothing. InvalidArgument for a filter that is not a regular expression or matches
 // nothing and for other options that mean nothing; FailedPrecondition while another run is under way in this
 // process (Google Benchmark's state is global) or for a target that is not here; ResourceExhausted if there
-// is no memory for the columns; the remote engine's errors.
+// is not enough memory for the columns; the remote engine's errors.
 absl::StatusOr<BenchReport> run_bench(const BenchOptions& options, const BenchCallback& progress = {});
 
 // A table for eyes.

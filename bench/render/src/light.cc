@@ -72,7 +72,7 @@ Color Light::radiance(Vector direction) const {
   return radiance(place(direction));
 }
 
-// As Image::sample, but for the poles: the probe does not go on beyond them.
+// As Image::sample, except at the poles: the probe does not go on beyond them.
 Color Light::radiance(Place at) const {
   const float half = 0.5f / static_cast<float>(height_);
   return environment_.probe->sample(at.x, std::clamp(at.y, half, 1 - half));

@@ -70,7 +70,7 @@ absl::StatusOr<Scene> load_scene(const std::string& path) {
   for (unsigned k = 0; k < file->mNumMeshes; ++k) {
     const aiMaterial& source = *file->mMaterials[file->mMeshes[k]->mMaterialIndex];
     Material material;
-    auto& metallic = material.metallic.emplace();
+    auto& metallic = *(material.metallic = Material::Metallic{});
     // A file without metallic roughness is matte and dull.
     metallic.metalness = 0;
     metallic.roughness = 0.7f;

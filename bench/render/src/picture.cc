@@ -59,7 +59,7 @@ float filmic_curve(float x) {
 std::uint8_t encode(float linear) {
   const float v = std::clamp(linear, 0.0f, 1.0f);
   const float srgb = v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1 / 2.4f) - 0.055f;
-  return static_cast<std::uint8_t>(255 * srgb + 0.5f);
+  return static_cast<std::uint8_t>(std::lround(255 * srgb));
 }
 
 }  // namespace

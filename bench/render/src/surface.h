@@ -22,7 +22,8 @@ struct Surface {
 
 inline Surface surface_at(const scene::Mesh& mesh, const Material& material, std::uint32_t triangle, float u, float v,
                           Vector direction) {
-  const auto& [a, b, c] = mesh.triangles[triangle];
+  const auto& corners = mesh.triangles[triangle];
+  const std::uint32_t a = corners[0], b = corners[1], c = corners[2];
   const float w = 1 - u - v;
   const auto at = [&](const auto& values) { return w * values[a] + u * values[b] + v * values[c]; };
   const Vector ab = mesh.positions[b] - mesh.positions[a], ac = mesh.positions[c] - mesh.positions[a];

@@ -17,22 +17,29 @@
 
 namespace facetwise {
 
-// Numbers of nodes. v, a, r, t: docs/albedo.md.
+// Numbers of nodes. v, a, r, t, e: docs/albedo.md.
 struct AlbedoSizes {
   std::uint32_t v = 129, a = 129;                                        // of isotropic roughness
-  std::uint32_t ratio_v = 33, ratio_a = 65, ratio_r = 17, ratio_t = 17;  // of anisotropic over isotropic
+  std::uint32_t ratio_v = 33, ratio_a = 65, ratio_r = 17, ratio_t = 17;  // of anisotropic over isotropic; dielectric: 0
+  std::uint32_t e = 0;                                                   // of a dielectric's eta, else 0
+  bool dielectric() const { return e != 0; }
   std::size_t isotropic() const { return std::size_t{v} * a; }
   std::size_t ratio() const { return std::size_t{ratio_v} * ratio_a * ratio_r * ratio_t; }
-  std::size_t mean() const { return std::size_t{a} * ratio_r; }
-  std::size_t total() const { return isotropic() + ratio() + mean(); }
+  std::size_t mean() const { return std::size_t{a} * (dielectric() ? e : ratio_r); }
+  // A dielectric has two values a node.
+  std::size_t total() const { return dielectric() ? 2 * isotropic() * e + mean() : isotropic() + ratio() + mean(); }
   bool operator==(const AlbedoSizes&) const = default;
 };
+inline constexpr AlbedoSizes kDielectricAlbedo{65, 33, 0, 0, 0, 0, 65};
 
 // What kernels read.
 struct AlbedoTableView {
   const float* isotropic;  // E(v, a): [a][v]
   const float* ratio;      // E(v, a, r, t) / E(v, a): [t][r][a][v]
-  const float* mean;       // the cosine-weighted average of E over the hemisphere: [r][a]
+  const float* mean;       // the cosine-weighted average of E over the hemisphere: [r][a]; dielectric: [e][a]
+  // Of a dielectric, instead of the first two: what is reflected and transmitted together, [e][a][v]; and what share of
+  // it is reflected, less Fresnel's reflectance of a smooth surface, [e][a][u], u = sqrt(i_z).
+  const float *both, *share;
   AlbedoSizes sizes;
   float inverse_range;  // 1 / (alpha / (1 + alpha)) of the largest roughness
 };
@@ -41,16 +48,16 @@ struct AlbedoTableView {
 class AlbedoTable {
  public:
   struct Options {
-    AlbedoSizes sizes{};
-    // Samples a node of `ratio`, a power of two; nodes of `isotropic` have 32 times as many. Four times both for V-cavity
-    // without an `exact` sampler.
+    AlbedoSizes sizes{}, dielectric_sizes = kDielectricAlbedo;
+    // Samples a node of `ratio` and of a dielectric's, a power of two; nodes of `isotropic` have 32 times as many. Four
+    // times both for V-cavity without an `exact` sampler.
     std::size_t samples = 512;
     // Told the fraction done, rising to 1; one call at a time, from any thread.
     std::function<void(double)> progress{};
   };
 
   // Computes a model's table in the caller's TBB arena: the same bits on every machine. Of the model its distribution,
-  // masking, shadowing and table of slopes matter. InvalidArgument: a model without visible normals, a table of slopes
+  // masking, shadowing and table of slopes matter, and whether it is a dielectric. InvalidArgument: a model without visible normals, a table of slopes
   // that is not radial, sizes that no table has.
   static absl::StatusOr<std::shared_ptr<const AlbedoTable>> build(const Model& model, const Options& options);
 
@@ -75,6 +82,7 @@ class AlbedoTable {
     Masking masking;
     Shadowing shadowing;
     std::uint64_t slopes;  // SlopeTable::id(), else 0
+    bool dielectric;
     bool operator==(const Key&) const = default;
   };
   static Key key_of(const Model& model);
@@ -98,7 +106,8 @@ constexpr bool has_lobe(Operation operation, const Model& model) {
 constexpr bool reads_albedo(Operation operation, const Model& model) {
   return operation == Operation::albedo || has_lobe(operation, model) ||
          (model.compensation == Compensation::turquin &&
-          (operation == Operation::sample_reflection || operation == Operation::evaluate_reflection));
+          (operation == Operation::sample_reflection || operation == Operation::evaluate_reflection ||
+           scatters(operation)));
 }
 
 // The table that calls use for a model, kept for the life of the process: built with the default options on first use

@@ -24,15 +24,16 @@ namespace facetwise {
 //   evaluate_transmission  incident roughness outgoing       value pdf status
 //   sample_scattering      incident roughness random         the same, event branch_probability
 //   evaluate_scattering    incident roughness outgoing       value pdf branch_probability status
-//   albedo                 incident roughness                albedo mean_albedo status
+//   albedo                 incident roughness                albedo mean_albedo transmitted status
 //
 // "roughness" is alpha and, as far as given, mean_slope and slope_correlation. Operations also read what the
 // model's interface needs: f0, f90 (Schlick) or eta (dielectric). Values and masking are no sampler's: evaluate_* read
 // Batch::sampler where the pdf is wanted, masking and albedo never.
 //
-// albedo is what share of the light from i the surface reflects by one scattering at microfacets with F = 1, whatever
-// the interface (conductor or schlick): what a layer above another leaves to it is about 1 - F albedo. It takes no mean
-// slope; i_z <= 0 is answered as i_z = 0. docs/albedo.md has its errors.
+// albedo is what share of the light from i the surface reflects by one scattering at microfacets with F = 1 (conductor or
+// schlick): what a layer above another leaves to it is about 1 - F albedo. Of a dielectric it is what it reflects by
+// Fresnel's equations, and `transmitted` what goes through. It takes no mean slope; i_z <= 0 is answered as i_z = 0.
+// docs/albedo.md has its errors.
 //
 // With a dielectric, *_reflection and *_transmission force the event: each microfacet reflects, or transmits,
 // whatever its Fresnel reflectance F, which is then part of weight and value only. *_scattering choose between
@@ -132,6 +133,7 @@ struct Batch {
                                                 // a path divides its weight by to compare it with others'
     OutputColumn<float> albedo{};               // E(i)
     OutputColumn<float> mean_albedo{};          // average of E over the hemisphere, by the cosine
+    OutputColumn<float> transmitted{};          // share of the light from i that goes through a dielectric
     OutputColumn<std::uint8_t> event{};         // Event
     OutputColumn<std::uint8_t> status{};        // LaneStatus
   } out{};

@@ -1,7 +1,7 @@
 // Tables of albedo as bytes and files, and those that the process keeps.
 //
 // The bytes (src/table/sealed.h): 8 of magic, the version, distribution, masking and shadowing as uint32, the id of the
-// table of slopes as uint64, the six sizes as uint32, the values.
+// table of slopes as uint64, the seven sizes as uint32, four bytes of zero, the values.
 #include "facetwise/albedo_table.h"
 
 #include <cstring>
@@ -16,14 +16,15 @@
 namespace facetwise {
 namespace {
 
-constexpr Seal kSeal = {{'f', 'w', 'a', 'l', 'b', 'e', 'd', '\x1a'}, 1, "albedo", "AlbedoTable"};
+constexpr Seal kSeal = {{'f', 'w', 'a', 'l', 'b', 'e', 'd', '\x1a'}, 2, "albedo", "AlbedoTable"};
 struct Header {
   char magic[8];
   std::uint32_t version, distribution, masking, shadowing;
   std::uint64_t slopes;
   AlbedoSizes sizes;
+  std::uint32_t zero;
 };
-static_assert(sizeof(Header) == 56 && sizeof(AlbedoSizes) == 24);
+static_assert(sizeof(Header) == 64 && sizeof(AlbedoSizes) == 28);
 
 template <class... Parts>
 absl::Status invalid(const Parts&... parts) {
@@ -60,8 +61,17 @@ class KeptTables {
 }  // namespace
 
 absl::Status check_sizes(const AlbedoSizes& sizes) {
-  for (const std::uint32_t size : {sizes.v, sizes.a, sizes.ratio_v, sizes.ratio_a, sizes.ratio_r, sizes.ratio_t})
-    if (size < 2 || size > 1025) return invalid("sizes: ", size, " nodes, not 2 to 1025");
+  const auto check = [](std::initializer_list<std::uint32_t> used) {
+    for (const std::uint32_t size : used)
+      if (size < 2 || size > 1025) return invalid("sizes: ", size, " nodes, not 2 to 1025");
+    return absl::OkStatus();
+  };
+  if (sizes.dielectric() && (sizes.ratio_v | sizes.ratio_a | sizes.ratio_r | sizes.ratio_t))
+    return invalid("sizes: a dielectric has no ratios");
+  const auto status = sizes.dielectric()
+                          ? check({sizes.v, sizes.a, sizes.e})
+                          : check({sizes.v, sizes.a, sizes.ratio_v, sizes.ratio_a, sizes.ratio_r, sizes.ratio_t});
+  if (!status.ok()) return status;
   // Kernels address nodes by 32 bits.
   if (sizes.total() > std::size_t{1} << 28) return invalid("sizes: ", sizes.total(), " nodes, more than 2^28");
   return absl::OkStatus();
@@ -76,6 +86,12 @@ std::shared_ptr<const AlbedoTable> AlbedoTableMaker::make(const AlbedoSizes& siz
   view.isotropic = table->values_.data();
   view.ratio = view.isotropic + sizes.isotropic();
   view.mean = view.ratio + sizes.ratio();
+  if (sizes.dielectric()) {
+    view.both = table->values_.data();
+    view.share = view.both + sizes.isotropic() * sizes.e;
+    view.mean = view.share + sizes.isotropic() * sizes.e;
+    view.isotropic = view.ratio = nullptr;
+  }
   view.sizes = sizes;
   view.inverse_range = static_cast<float>(1 / albedo_range(key.distribution));
   return table;
@@ -85,7 +101,7 @@ AlbedoTable::Key AlbedoTable::key_of(const Model& model) {
   return {model.distribution, model.masking,
           // V-cavity has no other.
           model.masking == Masking::smith ? model.shadowing : Shadowing::correlated,
-          model.table != nullptr ? model.table->id() : 0};
+          model.table != nullptr ? model.table->id() : 0, model.interface == Interface::dielectric};
 }
 
 bool AlbedoTable::fits(const Model& model) const { return key_ == key_of(model); }
@@ -94,6 +110,7 @@ std::string AlbedoTable::description() const {
   const auto text = [](auto value) { return absl::string_view(name(value).data(), name(value).size()); };
   std::string description = absl::StrCat(text(key_.distribution), " with ", text(key_.masking), " masking");
   if (key_.masking == Masking::smith) absl::StrAppend(&description, ", ", text(key_.shadowing), " shadowing");
+  if (key_.dielectric) absl::StrAppend(&description, ", dielectric");
   return description;
 }
 
@@ -104,7 +121,8 @@ std::string AlbedoTable::serialise() const {
                 static_cast<std::uint32_t>(key_.masking),
                 static_cast<std::uint32_t>(key_.shadowing),
                 key_.slopes,
-                view_.sizes};
+                view_.sizes,
+                0};
   std::memcpy(header.magic, kSeal.magic, sizeof kSeal.magic);
   return seal(header, values_);
 }
@@ -115,13 +133,15 @@ absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::parse(std::strin
   auto& [header, values] = *unsealed;
   if (header.distribution > static_cast<std::uint32_t>(Distribution::table) ||
       header.masking > static_cast<std::uint32_t>(Masking::vcavity) ||
-      header.shadowing > static_cast<std::uint32_t>(Shadowing::uncorrelated))
+      header.shadowing > static_cast<std::uint32_t>(Shadowing::uncorrelated) || header.zero != 0)
     return corrupted_by_hash();
+  // A dielectric's share is a difference.
+  const float least = header.sizes.dielectric() ? -1.0f : 0.0f;
   for (const float value : values)
-    if (!(value > 0 && value < 1000)) return invalid("an albedo of ", value, "; rebuild it");
+    if (!(value >= least && value < 1000)) return invalid("an albedo of ", value, "; rebuild it");
   return AlbedoTableMaker::make(header.sizes,
                                 {static_cast<Distribution>(header.distribution), static_cast<Masking>(header.masking),
-                                 static_cast<Shadowing>(header.shadowing), header.slopes},
+                                 static_cast<Shadowing>(header.shadowing), header.slopes, header.sizes.dielectric()},
                                 std::move(values));
 }
 

@@ -73,16 +73,39 @@ Node node_at(double v, double a, double r, double t, double range) {
           alpha(y)};
 }
 
+// eta of a coordinate, whose middle is 1: (eta - 1) / (eta + 1) is the square of what it is from there, over the largest.
+float eta_at(double e) {
+  const double from = 2 * e - 1, largest = (kLargestEta - 1.0) / (kLargestEta + 1.0);
+  const double r = std::copysign(from * from, from) * largest;
+  // At 1 itself light goes straight on; beside it, it is masked on both sides.
+  const double eta = std::abs(r) < 1e-6 ? 1.000002 : (1 + r) / (1 - r);
+  return std::clamp(static_cast<float>(eta), kSmallestEta, kLargestEta);
+}
+
+// Fresnel's equations without polarisation.
+double fresnel(double c, double eta) {
+  const double g2 = c * c + (eta - 1) * (eta + 1);
+  if (g2 <= 0) return 1;
+  const double g = std::sqrt(g2), s = (c - g) / (c + g), p = (eta * eta * c - g) / (eta * eta * c + g);
+  return (s * s + p * p) / 2;
+}
+
 // Runs the samples of nodes.
 class AlbedoBuilder {
  public:
   AlbedoBuilder(const Model& model, const AlbedoTable::Options& options)
-      : sizes_(options.sizes), range_(albedo_range(model.distribution)), values_(sizes_.total()) {
-    // Compensation, interface and retro-reflection play no part.
-    batch_.model = {.distribution = model.distribution,
-                    .masking = model.masking,
-                    .shadowing = model.shadowing,
-                    .table = model.table};
+      : sizes_(model.interface == Interface::dielectric ? options.dielectric_sizes : options.sizes),
+        range_(albedo_range(model.distribution)),
+        values_(sizes_.total()) {
+    // Compensation and retro-reflection play no part.
+    batch_.model = {
+        .distribution = model.distribution,
+        .masking = model.masking,
+        .shadowing = model.shadowing,
+        .interface = model.interface == Interface::dielectric ? Interface::dielectric : Interface::conductor,
+        .transport = Transport::importance,
+        .table = model.table};
+    if (sizes_.dielectric()) batch_.eta = 1.5f;
     batch_.sampler = default_sampler(Operation::sample_reflection, batch_);
     // Three numbers of which some make occluded samples spread less evenly.
     const bool uneven = batch_.sampler != Sampler::exact && uses_u3(batch_.model, batch_.sampler);
@@ -94,7 +117,11 @@ class AlbedoBuilder {
   absl::StatusOr<std::vector<float>> run(const std::function<void(double)>& progress) {
     const Node node = node_at(0.5, 0.5, 0, 0, range_);
     if (auto status = facetwise::check(Operation::sample_reflection, with(node, few_)); !status.ok()) return status;
+    return sizes_.dielectric() ? run_dielectric(progress) : run_conductor(progress);
+  }
 
+ private:
+  std::vector<float> run_conductor(const std::function<void(double)>& progress) {
     const std::size_t cells = std::size_t{sizes_.ratio_v} * sizes_.ratio_a;
     const std::size_t turns = std::size_t{sizes_.ratio_r} * sizes_.ratio_t;
     Work work(progress, static_cast<double>((sizes_.isotropic() + sizes_.mean()) * many_.u1.size() +
@@ -121,7 +148,37 @@ class AlbedoBuilder {
     return std::move(values_);
   }
 
- private:
+  // The event is forced, and Fresnel's reflectance is in the weights: their mean is smoother than that of chosen events.
+  std::vector<float> run_dielectric(const std::function<void(double)>& progress) {
+    const std::size_t plane = sizes_.isotropic(), nodes = plane * sizes_.e;
+    const double cost = static_cast<double>(few_.u1.size());
+    Work work(progress, static_cast<double>(4 * nodes) * cost + static_cast<double>(sizes_.mean() * many_.u1.size()));
+    float* const both = values_.data();
+    float* const share = both + nodes;
+    float* const mean = share + nodes;
+    work.each(nodes, 4 * cost, [&](std::size_t k) {
+      const double first = at(k % sizes_.v, sizes_.v), a = at(k % plane / sizes_.v, sizes_.a);
+      const float eta = eta_at(at(k / plane, sizes_.e));
+      const auto shares = [&](const Node& node) {
+        return std::pair(albedo(node, few_, eta), albedo(node, few_, eta, Operation::sample_transmission));
+      };
+      Node node = node_at(first, a, 0, 0, range_);
+      const auto stretched = shares(node);
+      both[k] = stretched.first + stretched.second;
+      const double z = std::max(first * first, 1e-7);
+      node.x = static_cast<float>(std::sqrt((1 - z) * (1 + z)));
+      node.y = 0;
+      node.z = static_cast<float>(z);
+      const auto [reflected, transmitted] = shares(node);
+      share[k] = static_cast<float>(reflected / (static_cast<double>(reflected) + transmitted) - fresnel(z, eta));
+    });
+    work.each(sizes_.mean(), static_cast<double>(many_.u1.size()), [&](std::size_t k) {
+      mean[k] =
+          mean_albedo(node_at(0.5, at(k % sizes_.a, sizes_.a), 0, 0.5, range_), eta_at(at(k / sizes_.a, sizes_.e)));
+    });
+    return std::move(values_);
+  }
+
   static double at(std::size_t k, std::uint32_t nodes) { return static_cast<double>(k) / (nodes - 1); }
 
   Batch with(const Node& node, const Points& points) const {
@@ -136,27 +193,35 @@ class AlbedoBuilder {
     return batch;
   }
 
-  float albedo(const Node& node, const Points& points) const {
+  float albedo(const Node& node, const Points& points, float eta = 0,
+               Operation operation = Operation::sample_reflection) const {
     thread_local std::vector<float> weights;
     weights.resize(points.u1.size());
-    return mean_weight(with(node, points), weights);
+    Batch batch = with(node, points);
+    if (eta != 0) batch.eta = eta;
+    if (operation == Operation::sample_transmission) {
+      batch.sampler = default_sampler(operation, batch);
+      batch.u3 = uses_u3(batch.model, batch.sampler) ? Column<float>(points.u3) : Column<float>();
+    }
+    return mean_weight(operation, batch, weights);
   }
-  static float mean_weight(Batch batch, std::span<float> weights) {
+  static float mean_weight(Operation operation, Batch batch, std::span<float> weights) {
     batch.out.weight = weights;
     // Nothing of a node can be wrong where run() has checked one.
-    if (!facetwise::run(Operation::sample_reflection, batch, {.threads = Threads::one}).ok()) std::abort();
+    if (!facetwise::run(operation, batch, {.threads = Threads::one}).ok()) std::abort();
     double sum = 0;
     for (const float weight : weights) sum += weight;
     // Few samples may all be occluded; nothing is divided by 0.
     return std::max(static_cast<float>(sum / static_cast<double>(weights.size())), 1e-6f);
   }
 
-  float mean_albedo(const Node& node) const {
+  float mean_albedo(const Node& node, float eta = 0) const {
     thread_local std::vector<float> weights;
     weights.resize(disc_.points.u1.size());
     Batch batch = with(node, disc_.points);
     batch.incident = {disc_.x, disc_.y, disc_.z};
-    return mean_weight(batch, weights);
+    if (eta != 0) batch.eta = eta;
+    return mean_weight(Operation::sample_reflection, batch, weights);
   }
 
   AlbedoSizes sizes_;
@@ -170,7 +235,11 @@ class AlbedoBuilder {
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::build(const Model& model, const Options& options) {
-  if (auto status = check_sizes(options.sizes); !status.ok()) return status;
+  const bool dielectric = model.interface == Interface::dielectric;
+  const AlbedoSizes& sizes = dielectric ? options.dielectric_sizes : options.sizes;
+  if (sizes.dielectric() != dielectric)
+    return absl::InvalidArgumentError("sizes: those of a dielectric have `e`, others not");
+  if (auto status = check_sizes(sizes); !status.ok()) return status;
   if (options.samples < 2 || options.samples > 65536 || !std::has_single_bit(options.samples))
     return absl::InvalidArgumentError(
         absl::StrCat("samples: ", options.samples, " is not a power of two in [2, 65536]"));
@@ -179,7 +248,7 @@ absl::StatusOr<std::shared_ptr<const AlbedoTable>> AlbedoTable::build(const Mode
         "model.table: albedo needs normals that are distributed symmetrically: a radial table");
   auto values = AlbedoBuilder(model, options).run(options.progress);
   if (!values.ok()) return values.status();
-  return AlbedoTableMaker::make(options.sizes, key_of(model), *std::move(values));
+  return AlbedoTableMaker::make(sizes, key_of(model), *std::move(values));
 }
 
 }  // namespace facetwise

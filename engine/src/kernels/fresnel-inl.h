@@ -52,7 +52,7 @@ struct InterfaceInputs {
       eta = LoadU(d, tile.in[kEta] + lane);
     }
   }
-  // By the model's interface, which is no conductor.
+  // By the model's interface, which is not a conductor.
   HWY_INLINE V Reflectance(D d, const Tile& tile, V c) const {
     if (tile.interface == Interface::schlick) return SchlickReflectance(d, c, f0, f90);
     V g;

@@ -108,7 +108,7 @@ struct Cap : VisibleNormals, HalfVectors {
 // Reflections by a smaller cap: Eto & Tokuyoshi 2023. For i_z > 0 the cap ends at -k c,
 //   k = (1 - a^2) s^2 / (s^2 + a^2 i_z^2),  s = 1 + sgn(1 - a) sin(theta)                          (Eq. 5)
 // with a = alpha where it is isotropic, else min(alpha_x, alpha_y, 1) (Eq. 6). With S = 1 + sin(theta) and
-// 1 - sin(theta) = i_z^2 / S both signs have the same form: S^2 and i_z^2 change places. Likewise
+// 1 - sin(theta) = i_z^2 / S both signs have the same form: S^2 and i_z^2 change places. So do
 // 1 - k = a^2 (S^2 + i_z^2) / (the same denominator).
 struct Bounded : SamplerTraits, HalfVectors {
   static constexpr bool kNormals = false;

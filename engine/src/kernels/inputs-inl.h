@@ -139,6 +139,22 @@ struct QueryInputs : Inputs<D, S> {
   }
 };
 
+// The lanes of an operation's inputs that are not ordinary; `refine` changes the classes.
+template <bool kFast, class D, class In, class Refine>
+HWY_INLINE Exceptions<D, kFast> ExceptionsOf(D d, const Tile& tile, std::size_t lane, const In& in,
+                                             const Refine& refine) {
+  LaneClasses<D> classes;
+  if constexpr (!kFast) {
+    classes = in.Classified(d, tile, lane);
+    refine(classes);
+  }
+  return Exceptions<D, kFast>(d, classes);
+}
+template <bool kFast, class D, class In>
+HWY_INLINE Exceptions<D, kFast> ExceptionsOf(D d, const Tile& tile, std::size_t lane, const In& in) {
+  return ExceptionsOf<kFast>(d, tile, lane, in, [](LaneClasses<D>&) {});
+}
+
 // Turned about n by half a turn: what retro-reflection does to a reflection. f(i', o) with i' = (-i_x, -i_y, i_z) is
 // f(i, o') as long as the normals are distributed symmetrically.
 template <class D, class V = Vec<D>>
@@ -157,7 +173,7 @@ HWY_INLINE void FetchAhead(const Tile& tile, std::size_t lane, std::size_t lanes
 
 // An operation is a struct that loads its inputs and has Run<kFast>(). Whole vectors of ordinary lanes, nearly
 // all, take the fast way, which knows no exceptions; an ordinary lane's results are the same both ways.
-// Kernels that fetch ahead are compiled apart: the test for it alone would cost the others 2 to 4 %.
+// Kernels that fetch ahead are compiled apart: the mere test for it would cost the others 2 to 4 %.
 template <class D, class Op, bool kFetchesAhead = false>
 void ForEachVector(const Tile& given, Statistics& statistics) {
   const D d{};

@@ -40,9 +40,7 @@ struct LobeOf {
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics&) const {
     const V zero = Zero(d), one = Set(d, 1.0f), below_one = Set(d, kLargestBelowOne);
-    LaneClasses<D> classes;
-    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
-    const Exceptions<D, kFast> exceptions(d, classes);
+    const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in);
     const AlbedoPlace<D> place(d, *tile.albedo, in, exceptions);
     const V mean = AlbedoLookup<D>::Mean(d, *tile.albedo, place);
     V share = IfThenElseZero(in.z > zero, one - AlbedoLookup<D>::Albedo(d, *tile.albedo, place));

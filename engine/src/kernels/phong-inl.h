@@ -130,7 +130,7 @@ struct Phong : SlopeDistribution<Phong>, DistributionTraits {
     const V cos2 = Max(cos * cos, Set(d, 0x1p-60f)), sin2 = sin * sin;
     const V sx = i.ax * ex, sy = i.ay * ey, a = Fma(sx, sx, sy * sy);
     const V nearest2 = at.k * at.k / cos2, bend = Fma(a, nearest2, one), c = Rise(d, nearest2, bend);
-    // The log of the share of slopes beyond `nearest` that are longer than this one, but for its sign.
+    // The log of the share of slopes beyond `nearest` that are longer than this one, without its sign.
     const V gap = im * inverse / (at.root * cos), nearest = at.k / Max(cos, Set(d, kHorizon));
     const V l = Min(Log1p(d, Min(a * gap * (gap + nearest + nearest) / bend, Set(d, 1e30f))) / a, Set(d, 80.0f));
     const V s = Max(Expm1(d, l) * Exp(d, Neg(l)), Set(d, 1e-36f));
@@ -144,7 +144,7 @@ struct Phong : SlopeDistribution<Phong>, DistributionTraits {
   }
 
  private:
-  // The log of the share of slopes beyond a rho, but for its sign.
+  // The log of the share of slopes beyond a rho, without its sign.
   template <class D, class V = Vec<D>>
   static HWY_INLINE V LogShare(D d, V rho2, V a) {
     return Log1p(d, Min(a * rho2, Set(d, 1e30f))) / a;

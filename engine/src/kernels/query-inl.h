@@ -27,9 +27,7 @@ struct Query {
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
-    LaneClasses<D> classes;
-    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
-    const Exceptions<D, kFast> exceptions(d, classes);
+    const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in);
     const InterfaceInputs<D> interface(d, tile, lane);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     V x = exceptions.Computable(in.ox, 0.0f), y = exceptions.Computable(in.oy, 0.0f);
@@ -80,9 +78,7 @@ struct MaskingOf {
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
-    LaneClasses<D> classes;
-    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
-    const Exceptions<D, kFast> exceptions(d, classes);
+    const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     // A mirror masks nothing in front of it, and shows nothing to what is behind.
     const V mirror = IfThenElseZero(in.z > zero, one);

@@ -31,9 +31,7 @@ struct Sample {
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f);
-    LaneClasses<D> classes;
-    if constexpr (!kFast) classes = in.Classified(d, tile, lane);
-    const Exceptions<D, kFast> exceptions(d, classes);
+    const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in);
     const InterfaceInputs<D> interface(d, tile, lane);
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
 
@@ -41,14 +39,7 @@ struct Sample {
     V u3 = exceptions.Computable(in.u3, 0.0f);
     Drawer::Draw(d, i, exceptions.Computable(in.u1, 0.0f), exceptions.Computable(in.u2, 0.0f), u3, drawn);
 
-    // o = 2 (i.M) / (M.M) M - i
-    V rho = (drawn.im + drawn.im) / drawn.mm;
-    if constexpr (Drawer::kUnit) {
-    } else if constexpr (Drawer::kExact) {
-      if (!i.all_front) rho = Select(i.front, rho, Max(rho, Set(d, kSmallestRho<S>)));
-    } else {
-      rho = Max(rho, Set(d, kSmallestRho<S>));
-    }
+    const V rho = Rho(d, i, drawn);
     V ox = Fms(rho, drawn.mx, i.x), oy = Fms(rho, drawn.my, i.y);
     V oz = Fms(rho, drawn.mz, i.z);
     if constexpr (Drawer::kExact) oz = Max(oz, Set(d, kRim));
@@ -57,14 +48,8 @@ struct Sample {
     if constexpr (!Drawer::kVisible) occluded = Or(occluded, drawn.im <= Set(d, kSmallestIm));
     const auto accepted = Not(occluded);
 
-    // p(o) = D(m) / (4 N)
     V pdf = zero;
-    if (tile.wanted & kWantsPdf) {
-      V numerator, denominator;
-      Drawer::Density(d, i, drawn, rho, numerator, denominator);
-      denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
-      pdf = IfThenElseZero(accepted, Min(numerator / denominator, Set(d, kLargestDensity)));
-    }
+    if (tile.wanted & kWantsPdf) pdf = IfThenElseZero(accepted, Density(d, i, drawn, rho));
 
     const bool fresnel = tile.interface != Interface::conductor && (tile.wanted & kWantsWeight);
     V im = drawn.im;
@@ -106,6 +91,26 @@ struct Sample {
       Store(d, tile, kOutOz, lane, exceptions.Output(oz, in.z));
     }
     exceptions.Finish(tile, lane, occluded, statistics);
+  }
+
+ private:
+  // o = rho M - i with rho = 2 (i.M) / (M.M).
+  static HWY_INLINE V Rho(D d, const Incident<D, S>& i, const Drawn<D>& drawn) {
+    const V rho = (drawn.im + drawn.im) / drawn.mm;
+    if constexpr (Drawer::kUnit) {
+      return rho;
+    } else if constexpr (Drawer::kExact) {
+      return i.all_front ? rho : Select(i.front, rho, Max(rho, Set(d, kSmallestRho<S>)));
+    } else {
+      return Max(rho, Set(d, kSmallestRho<S>));
+    }
+  }
+  // p(o) = D(m) / (4 N)
+  static HWY_INLINE V Density(D d, const Incident<D, S>& i, const Drawn<D>& drawn, V rho) {
+    V numerator, denominator;
+    Drawer::Density(d, i, drawn, rho, numerator, denominator);
+    denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
+    return Min(numerator / denominator, Set(d, kLargestDensity));
   }
 };
 

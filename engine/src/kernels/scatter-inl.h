@@ -55,89 +55,39 @@ struct Scatter {
 
   template <bool kFast>
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
-    const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, kLargestDensity);
+    const V zero = Zero(d), one = Set(d, 1.0f);
     const V loaded_eta = LoadU(d, tile.in[kEta] + lane);
-    LaneClasses<D> classes;
-    if constexpr (!kFast) {
-      classes = in.Classified(d, tile, lane);
+    const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in, [&](LaneClasses<D>& classes) {
       classes.valid = And(classes.valid, InUnitInterval(d, u3));
       classes.smooth = And(classes.valid, Or(classes.smooth, Unbent(d, tile, lane)));
-    }
-    const Exceptions<D, kFast> exceptions(d, classes);
+    });
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     const V eta = exceptions.Computable(loaded_eta, 1.5f), inverse_eta = one / eta;
 
     Drawn<D> drawn;
-    V choice = exceptions.Computable(u3, 0.0f);
-    Drawer::Draw(d, i, exceptions.Computable(in.u1, 0.0f), exceptions.Computable(in.u2, 0.0f), choice, drawn);
-    if (tile.transmits) choice = zero;
+    V u = exceptions.Computable(u3, 0.0f);
+    Drawer::Draw(d, i, exceptions.Computable(in.u1, 0.0f), exceptions.Computable(in.u2, 0.0f), u, drawn);
+    if (tile.transmits) u = zero;
 
-    const V inverse_length = one / Sqrt(drawn.mm);
-    const V mx = drawn.mx * inverse_length, my = drawn.my * inverse_length, mz = drawn.mz * inverse_length;
-    const V c = Min(Max(drawn.im, Set(d, kSmallestIm)) * inverse_length, one);
-    auto seen = drawn.im > (Drawer::kVisible ? zero : Set(d, kSmallestIm));
-    if constexpr (Drawer::kVisible) seen = Not(NoLanes(d));
-
-    // Both events.
-    V rho = (drawn.im + drawn.im) / drawn.mm;
-    if constexpr (!Drawer::kUnit) rho = Max(rho, Set(d, kSmallestRho<S>));
-    V rx = Fms(rho, drawn.mx, i.x), ry = Fms(rho, drawn.my, i.y);
-    const V rz = Fms(rho, drawn.mz, i.z);
-    const Refraction<D> refraction(d, c, eta);
-    V tx = refraction.Direction(i.x, mx, inverse_eta), ty = refraction.Direction(i.y, my, inverse_eta),
-      tz = refraction.Direction(i.z, mz, inverse_eta);
-    // A small eta makes the length inexact.
-    const V scale = NegFma(Set(d, 0.5f), Dot(tx, ty, tz, tx, ty, tz), Set(d, 1.5f));
-    tx = tx * scale;
-    ty = ty * scale;
-    tz = tz * scale;
-
-    const auto reflectable = And(seen, rz > zero);
-    const auto refractable = And(And(seen, tz < zero), refraction.g > zero);
-    V reflected = IfThenElseZero(reflectable, refraction.f);
-    const V rest = one - refraction.f;
-    V transmitted = IfThenElseZero(refractable, rest);
-    if (tile.transmits) reflected = zero;
-    const V total = reflected + transmitted;
-    // A chosen event is a valid one, however u3 total rounds.
-    const auto reflects = And(Or(choice * total < reflected, transmitted <= zero), Not(Forced(d, tile)));
-    const auto accepted = total > zero;
-    const V branch = IfThenElseZero(accepted, Select(reflects, reflected, transmitted) / total);
-
+    const Normal m(d, drawn);
+    const Reflected r(d, i, drawn);
+    const Refracted t(d, i, m, eta, inverse_eta);
+    const Choice choice(d, tile, m, r, t, u);
     // Where nothing is refracted the occluded direction is the reflection's.
-    const auto bends = AndNot(reflects, And(seen, refraction.g > zero));
-    const V ox = Select(bends, tx, rx), oy = Select(bends, ty, ry), oz = Select(bends, tz, rz);
+    const auto bends = AndNot(choice.reflects, And(m.seen, t.refraction.g > zero));
+    const V oz = Select(bends, t.z, r.z);
 
     V pdf = zero;
-    if (tile.wanted & kWantsPdf) {
-      V numerator, denominator;
-      Drawer::Density(d, i, drawn, rho, numerator, denominator);
-      denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
-      const V jacobian = Select(reflects, one, four * c * eta * (refraction.g / (refraction.bend * refraction.bend)));
-      pdf = IfThenElseZero(accepted, Min(Min(numerator / denominator, largest) * jacobian * branch, largest));
-    }
+    if (tile.wanted & kWantsPdf) pdf = Density(d, i, drawn, m, r, t, choice, eta);
     Store(d, tile, kOutPdf, lane, exceptions.Output(pdf, zero));
-
     const V radiance = tile.importance ? one : inverse_eta * inverse_eta;
     const Mirror mirror(d, in, tile, loaded_eta, u3);
-    if (tile.wanted & kWantsWeight) {
-      const V reflected_weight = S::Masking::template Weight<Drawer>(d, i, drawn, rx, ry, rz, tile.uncorrelated);
-      V transmitted_weight = S::Masking::TransmissionMasking(d, i, mz, c, refraction.g * inverse_eta, tx, ty, tz);
-      if constexpr (Drawer::kOwnShift) {
-        if (!i.all_front) transmitted_weight = transmitted_weight * S::Masking::OverVisible(d, i, drawn);
-      } else if constexpr (!Drawer::kNIsSigma) {
-        V numerator = drawn.two_n;
-        if constexpr (S::Distribution::kShifts && !Drawer::kShifted)
-          if (!i.all_front) numerator = numerator * Exp(d, i.shift);
-        transmitted_weight = transmitted_weight * (numerator / S::Masking::VisibleTwoN(d, i, mz, c));
-      }
-      // F over its probability is `total`; so is 1 - F over the other. A forced event keeps 1 - F.
-      V weight = Select(reflects, reflected_weight, transmitted_weight * radiance) * total;
-      weight = Min(IfThenElseZero(accepted, weight), largest);
-      Store(d, tile, kOutWeight, lane, exceptions.Output(weight, mirror.weight));
-    }
+    if (tile.wanted & kWantsWeight)
+      Store(d, tile, kOutWeight, lane,
+            exceptions.Output(Weight(d, tile, i, drawn, m, r, t, choice, inverse_eta, radiance), mirror.weight));
 
-    V out_x = ox, out_y = oy, mirror_x = mirror.x, mirror_y = mirror.y, out_mx = mx, out_my = my;
+    V out_x = Select(bends, t.x, r.x), out_y = Select(bends, t.y, r.y), mirror_x = mirror.x, mirror_y = mirror.y;
+    V out_mx = m.x, out_my = m.y;
     Turn(d, tile, Not(bends), out_x, out_y);
     Turn(d, tile, Not(bends), out_mx, out_my);
     Turn(d, tile, mirror.reflects, mirror_x, mirror_y);
@@ -149,11 +99,11 @@ struct Scatter {
     Store(d, tile, kOutOz, lane, exceptions.Output(oz, mirror.z));
     Store(d, tile, kOutMx, lane, exceptions.Output(out_mx, zero));
     Store(d, tile, kOutMy, lane, exceptions.Output(out_my, zero));
-    Store(d, tile, kOutMz, lane, exceptions.Output(mz, one));
-    Store(d, tile, kOutIm, lane, exceptions.Output(c, in.z));
-    Store(d, tile, kOutBranch, lane, exceptions.Output(branch, mirror.branch));
+    Store(d, tile, kOutMz, lane, exceptions.Output(m.z, one));
+    Store(d, tile, kOutIm, lane, exceptions.Output(m.c, in.z));
+    Store(d, tile, kOutBranch, lane, exceptions.Output(choice.branch, mirror.branch));
     const V scale_t = tile.importance ? one : loaded_eta * loaded_eta;
-    const auto transmits = And(accepted, Not(reflects));
+    const auto transmits = And(choice.accepted, Not(choice.reflects));
     Store(d, tile, kOutEtaScale, lane,
           exceptions.Output(Select(transmits, scale_t, one), Select(mirror.reflects, one, scale_t)));
     if (tile.event != nullptr) {
@@ -162,10 +112,99 @@ struct Scatter {
       const Rebind<uint8_t, D> db;
       StoreU(DemoteTo(db, ConvertTo(di, event)), db, tile.event + lane);
     }
-    exceptions.Finish(tile, lane, Not(accepted), statistics);
+    exceptions.Finish(tile, lane, Not(choice.accepted), statistics);
   }
 
  private:
+  // The microfacet normal, c = i.m, and whether i sees it.
+  struct Normal {
+    V x, y, z, c;
+    Mask<D> seen;
+    HWY_INLINE Normal(D d, const Drawn<D>& drawn) {
+      const V one = Set(d, 1.0f), inverse_length = one / Sqrt(drawn.mm);
+      x = drawn.mx * inverse_length;
+      y = drawn.my * inverse_length;
+      z = drawn.mz * inverse_length;
+      c = Min(Max(drawn.im, Set(d, kSmallestIm)) * inverse_length, one);
+      seen = drawn.im > (Drawer::kVisible ? Zero(d) : Set(d, kSmallestIm));
+      if constexpr (Drawer::kVisible) seen = Not(NoLanes(d));
+    }
+  };
+  // Where each event goes.
+  struct Reflected {
+    V rho, x, y, z;
+    HWY_INLINE Reflected(D d, const Incident<D, S>& i, const Drawn<D>& drawn) {
+      rho = (drawn.im + drawn.im) / drawn.mm;
+      if constexpr (!Drawer::kUnit) rho = Max(rho, Set(d, kSmallestRho<S>));
+      x = Fms(rho, drawn.mx, i.x);
+      y = Fms(rho, drawn.my, i.y);
+      z = Fms(rho, drawn.mz, i.z);
+    }
+  };
+  struct Refracted {
+    Refraction<D> refraction;
+    V x, y, z;
+    HWY_INLINE Refracted(D d, const Incident<D, S>& i, const Normal& m, V eta, V inverse_eta)
+        : refraction(d, m.c, eta) {
+      x = refraction.Direction(i.x, m.x, inverse_eta);
+      y = refraction.Direction(i.y, m.y, inverse_eta);
+      z = refraction.Direction(i.z, m.z, inverse_eta);
+      // A small eta makes the length inexact.
+      const V scale = NegFma(Set(d, 0.5f), Dot(x, y, z, x, y, z), Set(d, 1.5f));
+      x = x * scale;
+      y = y * scale;
+      z = z * scale;
+    }
+  };
+  // Which of them happens: in proportion to F and 1 - F of what ends on its side.
+  struct Choice {
+    V total, branch;
+    Mask<D> reflects, accepted;
+    HWY_INLINE Choice(D d, const Tile& tile, const Normal& m, const Reflected& r, const Refracted& t, V u) {
+      const V zero = Zero(d), one = Set(d, 1.0f);
+      const auto reflectable = And(m.seen, r.z > zero);
+      const auto refractable = And(And(m.seen, t.z < zero), t.refraction.g > zero);
+      V reflected = IfThenElseZero(reflectable, t.refraction.f);
+      const V transmitted = IfThenElseZero(refractable, one - t.refraction.f);
+      if (tile.transmits) reflected = zero;
+      total = reflected + transmitted;
+      // A chosen event is a valid one, however u total rounds.
+      reflects = And(Or(u * total < reflected, transmitted <= zero), Not(Forced(d, tile)));
+      accepted = total > zero;
+      branch = IfThenElseZero(accepted, Select(reflects, reflected, transmitted) / total);
+    }
+  };
+
+  static HWY_INLINE V Density(D d, const Incident<D, S>& i, const Drawn<D>& drawn, const Normal& m, const Reflected& r,
+                              const Refracted& t, const Choice& choice, V eta) {
+    const V one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, kLargestDensity);
+    V numerator, denominator;
+    Drawer::Density(d, i, drawn, r.rho, numerator, denominator);
+    denominator = Set(d, 2.0f * kPi) * (i.ax * i.ay) * drawn.two_n * denominator;
+    const Refraction<D>& refraction = t.refraction;
+    const V bent = four * m.c * eta * (refraction.g / (refraction.bend * refraction.bend));
+    const V jacobian = Select(choice.reflects, one, bent);
+    return IfThenElseZero(choice.accepted,
+                          Min(Min(numerator / denominator, largest) * jacobian * choice.branch, largest));
+  }
+
+  static HWY_INLINE V Weight(D d, const Tile& tile, const Incident<D, S>& i, const Drawn<D>& drawn, const Normal& m,
+                             const Reflected& r, const Refracted& t, const Choice& choice, V inverse_eta, V radiance) {
+    const V reflected = S::Masking::template Weight<Drawer>(d, i, drawn, r.x, r.y, r.z, tile.uncorrelated);
+    V transmitted = S::Masking::TransmissionMasking(d, i, m.z, m.c, t.refraction.g * inverse_eta, t.x, t.y, t.z);
+    if constexpr (Drawer::kOwnShift) {
+      if (!i.all_front) transmitted = transmitted * S::Masking::OverVisible(d, i, drawn);
+    } else if constexpr (!Drawer::kNIsSigma) {
+      V numerator = drawn.two_n;
+      if constexpr (S::Distribution::kShifts && !Drawer::kShifted)
+        if (!i.all_front) numerator = numerator * Exp(d, i.shift);
+      transmitted = transmitted * (numerator / S::Masking::VisibleTwoN(d, i, m.z, m.c));
+    }
+    // F over its probability is `total`; so is 1 - F over the other. A forced event keeps 1 - F.
+    const V weight = Select(choice.reflects, reflected, transmitted * radiance) * choice.total;
+    return Min(IfThenElseZero(choice.accepted, weight), Set(d, kLargestDensity));
+  }
+
   static HWY_INLINE Mask<D> Forced(D d, const Tile& tile) { return tile.transmits ? Not(NoLanes(d)) : NoLanes(d); }
   static HWY_INLINE void Turn(D d, const Tile& tile, Mask<D> lanes, V& x, V& y) {
     if (!tile.retro) return;
@@ -214,12 +253,9 @@ struct ScatterQuery {
   HWY_INLINE void Run(D d, const Tile& tile, std::size_t lane, Statistics& statistics) const {
     const V zero = Zero(d), one = Set(d, 1.0f), four = Set(d, 4.0f), largest = Set(d, kLargestDensity);
     const V loaded_eta = LoadU(d, tile.in[kEta] + lane);
-    LaneClasses<D> classes;
-    if constexpr (!kFast) {
-      classes = in.Classified(d, tile, lane);
+    const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in, [&](LaneClasses<D>& classes) {
       classes.smooth = And(classes.valid, Or(classes.smooth, Unbent(d, tile, lane)));
-    }
-    const Exceptions<D, kFast> exceptions(d, classes);
+    });
     const Incident<D, S> i = in.Prepared(d, tile, exceptions);
     const V eta = exceptions.Computable(loaded_eta, 1.5f), inverse_eta = one / eta;
     V x = exceptions.Computable(in.ox, 0.0f), y = exceptions.Computable(in.oy, 0.0f);
@@ -289,7 +325,7 @@ struct ScatterQuery {
       Store(d, tile, kOutValue, lane, exceptions.Output(value, zero));
     }
     Store(d, tile, kOutBranch, lane, exceptions.Output(branch, zero));
-    // A reflection that no microfacet makes is no occluded one, as in pdf_reflection.
+    // A reflection that no microfacet makes is not an occluded one, as in pdf_reflection.
     auto answered = Or(reflects, reached);
     if (tile.transmits) answered = reached;
     exceptions.Finish(tile, lane, Not(answered), statistics);

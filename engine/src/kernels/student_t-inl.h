@@ -1,5 +1,5 @@
 // Student-t of gamma = 3: pi P22 = 8 / (2 + r^2)^3. With slopes measured by sqrt(2) alpha it is 2 / (1 + r^2)^3, the
-// normals of a sphere weighted by 2 m_hat_z^2, and all is algebraic: for w so stretched, of length nu, 2 sigma = (nu +
+// normals of a sphere weighted by 2 m_hat_z^2, and all is algebraic: for a w that is stretched so, of length nu, 2 sigma = (nu +
 // w_z)^2 / (2 nu).
 
 #if defined(FACETWISE_STUDENT_T_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -31,7 +31,7 @@ HWY_INLINE V InverseCubeRoot(D d, V x) {
   return y;
 }
 
-// x^(-1/5), likewise.
+// x^(-1/5), in the same way.
 template <class D, class V = Vec<D>>
 HWY_INLINE V InverseFifthRoot(D d, V x) {
   const V fifth = Set(d, 0.2f), six_fifths = Set(d, 1.2f);

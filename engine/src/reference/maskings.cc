@@ -37,7 +37,7 @@ Scaled hits(const Surface& surface, Vector i) {
       return {integrate([&](Real v) { return std::erfc(t * v); }, 1, 3, 0) / 2, 0};
     }
     case Distribution::student_t:
-      // Likewise the mean of twice the share of slopes that face i, (1 + tau)^2 (2 - tau) / 2.
+      // In the same way the mean of twice the share of slopes that face i, (1 + tau)^2 (2 - tau) / 2.
       return {integrate(
                   [&](Real v) {
                     const Real nu = std::sqrt(2 * a2 + z * z * v * v), front = 2 * a2 / ((nu + z * v) * nu);

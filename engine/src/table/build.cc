@@ -114,7 +114,7 @@ double integral(const SlopeTableView& view) {
 bool invert(std::span<const double> density, std::size_t uniforms, std::span<double> nodes) {
   double total = 0;
   for (std::size_t k = 0; k + 1 < density.size(); ++k) total += (density[k] + density[k + 1]) / 2;
-  // A sum of denormals is no distribution.
+  // A sum of denormals is not a distribution.
   if (!(total > 1e-290)) return false;
   const double cells = static_cast<double>(density.size() - 1);
   std::size_t cell = 0;

@@ -64,7 +64,7 @@ std::shared_ptr<const SlopeTable> SlopeTableMaker::make(const TableSizes& sizes,
   view.density = at;
   view.area = at += sizes.density();
   view.tilt = at += sizes.area();
-  view.side = at += sizes.tilt();
+  view.side = at + sizes.tilt();
   view.grid = static_cast<std::int32_t>(sizes.grid);
   view.areas = static_cast<std::int32_t>(sizes.areas);
   view.incidence = static_cast<std::int32_t>(sizes.incidence);

@@ -118,7 +118,7 @@ absl::StatusOr<SocketLock> SocketLock::take(const std::string& path) {
       // Not ours to remove, so the lock goes without it.
       unlink(name.c_str());
       close(std::exchange(lock.file_, -1));
-      return absl::UnavailableError(absl::StrCat("unix:", path, ": there is a file of that name that is no socket"));
+      return absl::UnavailableError(absl::StrCat("unix:", path, ": a file of that name is not a socket"));
     }
     unlink(path.c_str());
   }

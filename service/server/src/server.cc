@@ -21,7 +21,7 @@ namespace facetwise {
 namespace {
 
 constexpr std::chrono::milliseconds kPause{100};
-// Calls that are none of ours (a health watch, a reflection stream) have this long when ours are done.
+// Calls that are not ours (a health watch, a reflection stream) have this long when ours are done.
 constexpr std::chrono::milliseconds kLinger{300};
 
 absl::Status check_options(const ServerOptions& options) {

@@ -13,7 +13,7 @@
 namespace facetwise {
 
 // gRPC's synchronous calls block in reading, and do not say while they compute that the client has gone: one thread looks
-// after all of them. It sleeps but for a look each second, or each few milliseconds while a long call computes.
+// after all of them. It sleeps, and looks each second, or each few milliseconds while a long call computes.
 class Watch {
  public:
   Watch();

@@ -1,4 +1,4 @@
-// A connection to one server, for the calls that are none of the engine's: Info and Benchmark.
+// A connection to one server, for the calls that the engine does not make: Info, Benchmark and those of tables.
 #pragma once
 
 #include <chrono>
