@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ std::string_view name(Inputs);
 
 // Lanes that a stream of fresh columns goes through before it comes back to the first: far beyond every cache.
 inline constexpr std::size_t kFreshLanes = std::size_t{1} << 24;
+
+// The table of slopes of all cases with one, of default size: built when it is first asked for, in a second.
+const std::shared_ptr<const SlopeTable>& measured_table();
 
 // Roughness that differs from lane to lane, evenly spread over [0.05, 1]^2, is alpha_x = alpha_y = 0 here.
 struct Case {
@@ -43,7 +47,8 @@ struct Case {
   Model model() const {
     return {.distribution = distribution,
             .masking = masking,
-            .interface = scatters() ? Interface::dielectric : Interface::conductor};
+            .interface = scatters() ? Interface::dielectric : Interface::conductor,
+            .table = distribution == Distribution::table ? measured_table() : nullptr};
   }
   bool uses_u3() const {
     return is_sampling() && (operation == Operation::sample_scattering || facetwise::uses_u3(model(), *sampler));

@@ -34,7 +34,6 @@ void sample(int, siginfo_t*, void* context) {
 
 std::string function_at(std::uintptr_t counter) {
   Dl_info info;
-  // NOLINTNEXTLINE(performance-no-int-to-ptr)
   if (dladdr(reinterpret_cast<void*>(counter), &info) == 0 || info.dli_sname == nullptr) return {};
   int status = 0;
   char* demangled = abi::__cxa_demangle(info.dli_sname, nullptr, nullptr, &status);

@@ -56,7 +56,7 @@ TEST(Threads, CallersArena) {
 // Calls share nothing: many at once, from tasks of the caller's and from its threads.
 TEST(Threads, ConcurrentCalls) {
   const Lanes lanes = hard_lanes(Kind::mixed, 9000, 63);
-  const auto calls = all_calls();
+  const auto& calls = all_calls();
   std::vector<Answer> expected, got(calls.size());
   for (const Call& call : calls) expected.push_back(compute(call, lanes, {.threads = Threads::one}));
   tbb::parallel_for(std::size_t{0}, calls.size(), [&](std::size_t k) { got[k] = compute(calls[k], lanes); });

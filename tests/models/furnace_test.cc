@@ -10,8 +10,6 @@
 namespace facetwise::test {
 namespace {
 
-using reference::Vector;
-
 constexpr std::size_t kCount = kQuick ? 5'000 : 100'000;
 
 class ModelFurnace : public testing::TestWithParam<Family> {};

@@ -27,7 +27,8 @@ struct Accuracy {
 
 Accuracy measure(const SlopeTable& table, const SlopeDensity& p22) {
   Accuracy accuracy;
-  for (const auto& [theta, phi] : kIncidence) {
+  for (const auto& incidence : kIncidence) {
+    const double theta = incidence[0], phi = incidence[1];
     const Cells cells(theta, phi);
     auto exact = cells.visible(p22, 16);
     const double area = std::accumulate(exact.begin(), exact.end(), 0.0);

@@ -41,7 +41,8 @@ constexpr double kIncidence[][2] = {{0, 0}, {0.7, 2.1}, {1.4, 3.9}, {2.0, 5.6}};
 
 Tested test(const SlopeTable& table, const SlopeDensity& p22) {
   Tested tested;
-  for (const auto& [theta, phi] : kIncidence) {
+  for (const auto& incidence : kIncidence) {
+    const double theta = incidence[0], phi = incidence[1];
     SCOPED_TRACE(testing::Message() << "theta " << theta << ", phi " << phi);
     const Cells cells(theta, phi);
     const auto own =

@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Runs a program against a server of its own: remote.sh SERVER PROGRAM
+set -euo pipefail
+folder=$(mktemp -d)
+"$1" --listen "unix:$folder/socket" > "$folder/log" &
+server=$!
+trap 'kill $server; wait $server || true; rm -rf "$folder"' EXIT
+until grep -q ready "$folder/log"; do kill -0 $server; sleep 0.05; done
+"$2" "unix:$folder/socket"
