@@ -98,8 +98,6 @@ try:
              (json.loads(entry["message"])["message"] for entry in browser.get_log("performance"))
              if entry["method"] == "Network.requestWillBeSent"]
     check(all(url.startswith("file://") or url.startswith("data:") for url in asked), f"no network: {asked[:3]}")
-      if len(sys.argv) > 4:
-        browser.save_screenshot(sys.argv[4])
 finally:
     browser.quit()
 sys.exit(1 if failures else 0)
