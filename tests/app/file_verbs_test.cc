@@ -197,7 +197,7 @@ TEST(Albedo, TablesAreKeptInFiles) {
   const auto plain = facetwise({"sample", "--alpha", "0.5"}, random);
   EXPECT_NE(compensated.out, plain.out);
 
-  const auto fails = [&](std::vector<std::string> arguments, const std::string& says) {
+  const auto fails = [&](const std::vector<std::string>& arguments, const std::string& says) {
     const auto result = facetwise(arguments, rows);
     EXPECT_EQ(result.code, 1);
     EXPECT_NE(result.err.find(says), std::string::npos) << result.err;

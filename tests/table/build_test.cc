@@ -78,7 +78,7 @@ TEST(SlopeTable, SizesStayBelowTheirLimits) {
   EXPECT_LE(skewed_table().bytes(), std::size_t{64} << 20);
 }
 
-std::string refusal(const SlopeDensity& p22, SlopeTable::Options options = {.radial = true}) {
+std::string refusal(const SlopeDensity& p22, const SlopeTable::Options& options = {.radial = true}) {
   return std::string(SlopeTable::build(p22, options).status().message());
 }
 
