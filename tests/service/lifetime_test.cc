@@ -191,7 +191,7 @@ TEST_F(Lifetime, LimitsThatAnswerNothingAreRefused) {
 }
 
 TEST_F(Lifetime, CallsThatSendNothingAreEnded) {
-  ServerProcess server({"--listen", unix_address(), "--max-calls", "4", "--read-ms", "300", "--idle-ms", "600"});
+  ServerProcess server({"--listen", unix_address(), "--max-calls", "4", "--read-ms", "2000", "--idle-ms", "3000"});
   ASSERT_TRUE(server.ready());
   // Headers and no message, as many as there may be calls.
   const auto channel = open_channel(unix_address());
