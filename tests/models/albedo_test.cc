@@ -87,17 +87,19 @@ std::vector<float> albedos(const Model& model, const Places& at) {
 struct Mean {
   double value, deviation;
 };
-Mean mean_weight(const Model& model, const Places& at, std::size_t n, std::span<float> weight) {
+Mean mean_weight(const Model& model, const Places& at, std::size_t n, std::span<float> weight,
+                 Operation operation = Operation::sample_reflection, Column<float> eta = {}) {
   Batch batch;
   batch.model = model;
-  batch.sampler = default_sampler(Operation::sample_reflection, batch);
+  batch.eta = eta;
+  batch.sampler = default_sampler(operation, batch);
   batch.lanes = weight.size();
   batch.incident = {at.x[n], at.y[n], at.z[n]};
   batch.alpha_x = at.alpha_x[n];
   batch.alpha_y = at.alpha_y[n];
   batch.generator = {.seed = n};
   batch.out.weight = weight;
-  const auto statistics = sample_reflection(batch);
+  const auto statistics = run(operation, batch);
   EXPECT_TRUE(statistics.ok()) << statistics.status();
   double sum = 0, squares = 0;
   for (const float w : weight) sum += w, squares += static_cast<double>(w) * w;
@@ -407,23 +409,9 @@ TEST_P(Albedo, OfADielectric) {
       for (std::size_t n = 0; n < at.size(); ++n) {
         const DielectricTolerance tolerance = dielectric_tolerance(eta[n], isotropic);
         const auto mean_of = [&](Operation operation, Compensation compensation) {
-          Batch one;
-          one.model = model;
-          one.model.compensation = compensation;
-          one.eta = eta[n];
-          one.sampler = default_sampler(operation, one);
-          one.lanes = weight.size();
-          one.incident = {at.x[n], at.y[n], at.z[n]};
-          one.alpha_x = at.alpha_x[n];
-          one.alpha_y = at.alpha_y[n];
-          one.generator = {.seed = n};
-          one.out.weight = weight;
-          const auto statistics = run(operation, one);
-          EXPECT_TRUE(statistics.ok()) << statistics.status();
-          double sum = 0, squares = 0;
-          for (const float w : weight) sum += w, squares += static_cast<double>(w) * w;
-          const double count = static_cast<double>(weight.size()), value = sum / count;
-          return Mean{value, std::sqrt(std::max(0.0, squares / count - value * value) / count)};
+          Model one = model;
+          one.compensation = compensation;
+          return mean_weight(one, at, n, weight, operation, eta[n]);
         };
         const Mean r = mean_of(Operation::sample_reflection, Compensation::none);
         const Mean t = mean_of(Operation::sample_transmission, Compensation::none);

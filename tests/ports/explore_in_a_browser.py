@@ -3,40 +3,19 @@
 keyboard, prints no errors, asks the network for nothing and keeps nobody out. Usage: explore_in_a_browser.py PAGE PORT AXE"""
 import json
 import os
-import socket
 import sys
 
-from selenium import webdriver
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-# Selenium asks for "localhost", which a bare system without /etc/hosts does not know.
-resolve = socket.getaddrinfo
-socket.getaddrinfo = lambda host, *rest, **named: resolve("127.0.0.1" if host == "localhost" else host, *rest, **named)
+sys.path.append(os.path.join(os.path.dirname(__file__), "../support"))
+from browser import SOFTWARE_GL, axe_clean, check, chromium, failures  # noqa: E402
 
 page, port, axe = sys.argv[1:4]
-failures = []
-
-
-def check(condition, what):
-    print(("ok      " if condition else "FAILED  ") + what)
-    if not condition:
-        failures.append(what)
-
-
 with open(page, encoding="utf-8") as file, open(port, encoding="utf-8") as source:
     check(source.read() in file.read(), "the page holds ports/facetwise.glsl, to the letter")
 
-options = Options()
-options.binary_location = "/usr/bin/chromium"
-for argument in ("headless", "no-sandbox", "use-angle=swiftshader", "enable-unsafe-swiftshader", "disable-quic", "no-first-run",
-                 "disable-background-networking", "disable-component-update", "disable-sync", "window-size=1100,1400",
-                 "remote-debugging-pipe"):
-    options.add_argument("--" + argument)
-options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+browser = chromium(*SOFTWARE_GL)
 
 
 def value(sampler, name):
@@ -78,19 +57,10 @@ try:
     check(not browser.find_element(By.ID, "ay").is_enabled(), "the same roughness along both axes leaves one slider")
     check(lost("exact") == 0, "exact loses nothing there")
 
-    if os.path.exists(axe):
-        with open(axe, encoding="utf-8") as file:
-            axe_source = file.read()
-        for scheme in ("light", "dark"):
-            browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
-                                    {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
-            browser.execute_script(axe_source)
-            found = browser.execute_async_script("axe.run().then(arguments[0])")
-            for violation in found["violations"]:
-                print("   ", violation["id"], violation["help"], [node["html"][:120] for node in violation["nodes"]][:3])
-            check(not found["violations"], f"{scheme}: {len(found['passes'])} rules of axe-core pass, none is broken")
-    else:
-        print("skipped: axe-core was not fetched")
+    for scheme in ("light", "dark"):
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia",
+                                {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
+        axe_clean(browser, axe, scheme)
     messages = [entry["message"] for entry in browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
     messages = [message for message in messages if "GPU stall due to ReadPixels" not in message]
     check(not messages, f"the console is clean {messages[:3]}")

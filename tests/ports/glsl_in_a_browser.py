@@ -3,30 +3,16 @@
 with the library. Usage: glsl_in_a_browser.py FACETWISE PORT"""
 import base64
 import os
-import socket
 import subprocess
 import sys
 import tempfile
 
 import numpy as np
-from selenium import webdriver
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 
-# Selenium asks for "localhost", which a bare system without /etc/hosts does not know.
-resolve = socket.getaddrinfo
-socket.getaddrinfo = lambda host, *rest, **named: resolve("127.0.0.1" if host == "localhost" else host, *rest, **named)
+sys.path.append(os.path.join(os.path.dirname(__file__), "../support"))
+from browser import SOFTWARE_GL, check, chromium, failures  # noqa: E402
 
 facetwise, port = sys.argv[1:3]
-failures = []
-
-
-def check(condition, what):
-    print(("ok      " if condition else "FAILED  ") + what)
-    if not condition:
-        failures.append(what)
-
-
 SIDE = 512
 COUNT = SIDE * SIDE
 random = np.random.default_rng(21)
@@ -130,12 +116,7 @@ function run(port, body, p, q) {
 with open(path("page.html"), "w", encoding="utf-8") as file:
     file.write(page)
 
-options = Options()
-options.binary_location = "/usr/bin/chromium"
-for argument in ("headless", "no-sandbox", "use-angle=swiftshader", "enable-unsafe-swiftshader", "disable-quic", "no-first-run",
-                 "disable-background-networking", "disable-component-update", "disable-sync", "remote-debugging-pipe"):
-    options.add_argument("--" + argument)
-browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+browser = chromium(*SOFTWARE_GL)
 browser.set_script_timeout(300)
 try:
     browser.get("file://" + path("page.html"))

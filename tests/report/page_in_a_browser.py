@@ -5,30 +5,18 @@ import base64
 import json
 import os
 import re
-import socket
 import subprocess
 import sys
 import tempfile
 
-from selenium import webdriver
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-# Selenium asks for "localhost", which a bare system without /etc/hosts does not know.
-resolve = socket.getaddrinfo
-socket.getaddrinfo = lambda host, *rest, **named: resolve("127.0.0.1" if host == "localhost" else host, *rest, **named)
+sys.path.append(os.path.join(os.path.dirname(__file__), "../support"))
+from browser import axe_clean, check, chromium, failures  # noqa: E402
 
 facetwise, axe = sys.argv[1:3]
-failures = []
-
-
-def check(condition, what):
-    print(("ok      " if condition else "FAILED  ") + what)
-    if not condition:
-        failures.append(what)
 
 
 def run(*arguments, code=0):
@@ -53,26 +41,7 @@ for arguments, named in (
     check(named in run("report", *arguments, "--output", path("no.html"), code=1).stderr, f"the error names {named}")
     check(not os.path.exists(path("no.html")), "nothing was written")
 
-options = Options()
-options.binary_location = "/usr/bin/chromium"
-for argument in ("headless", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run",
-                 "disable-background-networking", "disable-component-update", "disable-sync", "window-size=1100,1400",
-                 "remote-debugging-pipe"):
-    options.add_argument("--" + argument)
-options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
-
-
-def axe_clean(what):
-    if not os.path.exists(axe):
-        print("skipped " + what + ": axe-core was not fetched")
-        return
-    with open(axe, encoding="utf-8") as file:
-        browser.execute_script(file.read())
-    found = browser.execute_async_script("axe.run().then(arguments[0])")
-    for violation in found["violations"]:
-        print("   ", violation["id"], violation["help"], [node["html"][:120] for node in violation["nodes"]][:3])
-    check(not found["violations"], f"{what}: {len(found['passes'])} rules of axe-core pass, none is broken")
+browser = chromium("disable-gpu")
 
 
 def opened(name):
@@ -127,7 +96,7 @@ try:
     widths = browser.execute_script(
         "return [...arguments[0].querySelectorAll('.compare img')].map((image) => image.naturalWidth)", figure)
     check(widths == [pictures["width"]] * 2, f"pictures are there: {widths}")
-    axe_clean("report")
+    axe_clean(browser, axe, "report")
 
     # On a phone and on paper; in the dark.
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
@@ -140,14 +109,14 @@ try:
     opened("report.html")
     background = browser.find_element(By.TAG_NAME, "body").value_of_css_property("background-color")
     check(background in ("rgba(18, 22, 27, 1)", "rgb(18, 22, 27)"), "dark where the reader wants it dark: " + background)
-    axe_clean("report in the dark")
+    axe_clean(browser, axe, "report in the dark")
     paper = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {})["data"])
     check(paper.startswith(b"%PDF") and len(paper) > 50000, f"prints: {len(paper)} bytes")
 
     opened("changes.html")
     rows = browser.find_elements(By.CSS_SELECTOR, "#comparison tbody tr")
     check(len(rows) > 50, f"{len(rows)} rows of what changed")
-    axe_clean("changes")
+    axe_clean(browser, axe, "changes")
 finally:
     browser.quit()
     folder.cleanup()
