@@ -77,39 +77,22 @@ Examples:
       ->required()
       ->allow_extra_args(false)
       ->option_text("unix:PATH|HOST:PORT (required)");
-  command.add_option("--threads", options.threads, "Threads that compute; default as many as there are cores")
-      ->check(CLI::Range(1, 4096))
-      ->option_text("N");
-  command.add_option("--max-message-mib", arguments->max_message_mib, "Largest request and response; default 16")
-      ->check(CLI::Range(1, 1024))
-      ->option_text("N");
-  command
-      .add_option("--max-mib-in-flight", arguments->max_mib_in_flight,
-                  "Requests and responses held at once; beyond, calls get RESOURCE_EXHAUSTED; default 1024")
-      ->check(CLI::Range(1, 1 << 24))
-      ->option_text("N");
-  command
-      .add_option("--max-calls", options.max_calls, "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128")
-      ->check(CLI::Range(1, 1 << 20))
-      ->option_text("N");
-  command.add_option("--read-seconds", arguments->read_seconds, "Longest wait for a call's message; default 20")
-      ->check(CLI::Range(1, 86400))
-      ->option_text("N");
-  command
-      .add_option("--stream-idle-seconds", arguments->stream_idle_seconds,
-                  "Longest wait for a stream's next message; default 300")
-      ->check(CLI::Range(1, 86400))
-      ->option_text("N");
-  command
-      .add_option("--max-tables-mib", arguments->max_tables_mib,
-                  "Tables of slopes that clients upload, together; default 256")
-      ->check(CLI::Range(1, 1 << 20))
-      ->option_text("N");
-  command
-      .add_option("--table-idle-seconds", arguments->table_idle_seconds,
-                  "How long a table stays that nobody uses; default 3600")
-      ->check(CLI::Range(1, 1 << 30))
-      ->option_text("N");
+  const auto add_number = [&](const char* flag, auto& number, int least, int most, const char* help) {
+    command.add_option(flag, number, help)->check(CLI::Range(least, most))->option_text("N");
+  };
+  add_number("--threads", options.threads, 1, 4096, "Threads that compute; default as many as there are cores");
+  add_number("--max-message-mib", arguments->max_message_mib, 1, 1024, "Largest request and response; default 16");
+  add_number("--max-mib-in-flight", arguments->max_mib_in_flight, 1, 1 << 24,
+             "Requests and responses held at once; beyond, calls get RESOURCE_EXHAUSTED; default 1024");
+  add_number("--max-calls", options.max_calls, 1, 1 << 20,
+             "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128");
+  add_number("--read-seconds", arguments->read_seconds, 1, 86400, "Longest wait for a call's message; default 20");
+  add_number("--stream-idle-seconds", arguments->stream_idle_seconds, 1, 86400,
+             "Longest wait for a stream's next message; default 300");
+  add_number("--max-tables-mib", arguments->max_tables_mib, 1, 1 << 20,
+             "Tables of slopes that clients upload, together; default 256");
+  add_number("--table-idle-seconds", arguments->table_idle_seconds, 1, 1 << 30,
+             "How long a table stays that nobody uses; default 3600");
   const auto add_file = [&](const char* flag, std::string& file, const char* help) {
     command.add_option(flag, file, help)->option_text("FILE");
   };
@@ -124,11 +107,8 @@ Examples:
   command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
       ->check(check_mode)
       ->option_text("MODE");
-  command
-      .add_option("--drain-seconds", arguments->drain_seconds,
-                  "Longest wait for calls in flight at the end; default 10")
-      ->check(CLI::Range(0, 86400))
-      ->option_text("N");
+  add_number("--drain-seconds", arguments->drain_seconds, 0, 86400,
+             "Longest wait for calls in flight at the end; default 10");
   command.add_flag("--allow-benchmark", options.allow_benchmark, "Let clients run benchmarks on this machine");
   add_named(command, "--target", options.execution.target, parse_target, "Instruction set of the kernels; default best",
             "best|scalar|avx2|avx3|neon");

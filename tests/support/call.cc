@@ -259,7 +259,8 @@ std::vector<Call> make_all_calls() {
   std::set<std::string> names;
   for (const Call& call : calls) names.insert(call_name(call));
   std::size_t closed = 0;
-  for (const auto& models : {all_models(), tabulated_models()}) {
+  const std::vector<Model> both[] = {all_models(), tabulated_models()};
+  for (const auto& models : both) {
     for (const Model& model : models) add_model(model, false, calls, names);
     for (const Model& model : models)
       if (takes_slopes(model)) add_model(model, true, calls, names);
@@ -272,10 +273,10 @@ std::vector<Call> make_all_calls() {
   for (std::size_t k = closed; k < calls.size(); k += 3) calls[few++] = calls[k];
   calls.resize(few);
   std::size_t turn = 0;
-  for (const auto& models : {all_models(), tabulated_models()})
+  for (const auto& models : both)
     for (const Model& model : models)
       if (!is_skewed(model)) add_with_lobe(model, turn++, calls);
-  for (const auto& models : {all_models(), tabulated_models()})
+  for (const auto& models : both)
     for (const Model& model : models)
       if (!is_skewed(model)) add_dielectric_albedo(model, turn++, calls);
 #ifdef FACETWISE_QUICK

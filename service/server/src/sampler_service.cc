@@ -41,30 +41,27 @@ SamplerService::SamplerService(const ServerOptions& options)
           [](SamplerService* service, grpc::ServerContext* context, grpc::ServerReader<v1::TableChunk>* reader,
              v1::SlopeTableInfo* response) { return service->upload_table(*context, *reader, *response); },
           this)));
-  AddMethod(new RpcServiceMethod(
-      "/facetwise.v1.Sampler/ListTables", RpcMethod::NORMAL_RPC,
-      new grpc::internal::RpcMethodHandler<SamplerService, v1::ListTablesRequest, v1::ListTablesResponse>(
-          [](SamplerService* service, grpc::ServerContext* context, const v1::ListTablesRequest*,
-             v1::ListTablesResponse* response) { return service->list_tables(*context, *response); },
-          this)));
-  AddMethod(new RpcServiceMethod(
-      "/facetwise.v1.Sampler/DeleteTable", RpcMethod::NORMAL_RPC,
-      new grpc::internal::RpcMethodHandler<SamplerService, v1::DeleteTableRequest, v1::DeleteTableResponse>(
-          [](SamplerService* service, grpc::ServerContext* context, const v1::DeleteTableRequest* request,
-             v1::DeleteTableResponse*) { return service->delete_table(*context, *request); },
-          this)));
-  AddMethod(
-      new RpcServiceMethod("/facetwise.v1.Sampler/Info", RpcMethod::NORMAL_RPC,
-                           new grpc::internal::RpcMethodHandler<SamplerService, v1::InfoRequest, v1::InfoResponse>(
-                               [](SamplerService* service, grpc::ServerContext* context, const v1::InfoRequest*,
-                                  v1::InfoResponse* response) { return service->info(*context, *response); },
-                               this)));
+  add_small("/facetwise.v1.Sampler/ListTables", &SamplerService::list_tables);
+  add_small("/facetwise.v1.Sampler/DeleteTable", &SamplerService::delete_table);
+  add_small("/facetwise.v1.Sampler/Info", &SamplerService::info);
   AddMethod(new RpcServiceMethod(
       "/facetwise.v1.Sampler/Benchmark", RpcMethod::SERVER_STREAMING,
       new grpc::internal::ServerStreamingHandler<SamplerService, v1::BenchmarkRequest, v1::BenchmarkProgress>(
           [](SamplerService* service, grpc::ServerContext* context, const v1::BenchmarkRequest* request,
              grpc::ServerWriter<v1::BenchmarkProgress>* writer) {
             return service->benchmark(*context, *request, *writer);
+          },
+          this)));
+}
+
+template <class Request, class Response>
+void SamplerService::add_small(const char* name, grpc::Status (SamplerService::*answer)(const Request&, Response&)) {
+  AddMethod(new RpcServiceMethod(
+      name, RpcMethod::NORMAL_RPC,
+      new grpc::internal::RpcMethodHandler<SamplerService, Request, Response>(
+          [answer](SamplerService* service, grpc::ServerContext* context, const Request* request, Response* response) {
+            const auto status = service->tokens_.check(*context);
+            return status.ok() ? (service->*answer)(*request, *response) : to_grpc(status);
           },
           this)));
 }
@@ -156,23 +153,20 @@ grpc::Status SamplerService::upload_table(grpc::ServerContext& context, grpc::Se
   return grpc::Status::OK;
 }
 
-grpc::Status SamplerService::list_tables(grpc::ServerContext& context, v1::ListTablesResponse& response) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+grpc::Status SamplerService::list_tables(const v1::ListTablesRequest&, v1::ListTablesResponse& response) {
   for (const Tables::Entry& entry : tables_.list()) describe(entry, *response.add_tables());
   response.set_max_bytes(tables_.max_bytes());
   response.set_max_idle_seconds(std::chrono::duration<double>(tables_.max_idle()).count());
   return grpc::Status::OK;
 }
 
-grpc::Status SamplerService::delete_table(grpc::ServerContext& context, const v1::DeleteTableRequest& request) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+grpc::Status SamplerService::delete_table(const v1::DeleteTableRequest& request, v1::DeleteTableResponse&) {
   if (tables_.erase(request.id())) return grpc::Status::OK;
   return error(grpc::StatusCode::NOT_FOUND,
                absl::StrCat("id: no table ", absl::Hex(request.id(), absl::kZeroPad16), " here"));
 }
 
-grpc::Status SamplerService::info(grpc::ServerContext& context, v1::InfoResponse& response) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+grpc::Status SamplerService::info(const v1::InfoRequest&, v1::InfoResponse& response) {
   const std::string_view release = version();
   response.set_version(std::string(release));
   response.set_target(std::string(name(resolve(compute_.execution().target).value_or(Target::best))));

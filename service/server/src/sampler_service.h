@@ -39,13 +39,16 @@ class SamplerService final : public grpc::Service {
   enum class Messages { one, many };
 
   void add(const char* name, Answer answer, Messages messages);
+  // Of generated messages, one each way; the caller's token is checked.
+  template <class Request, class Response>
+  void add_small(const char* name, grpc::Status (SamplerService::*answer)(const Request&, Response&));
   grpc::Status answer_one(Answer answer, grpc::ServerContext& context, Stream& stream);
   grpc::Status answer_many(Answer answer, grpc::ServerContext& context, Stream& stream);
   grpc::Status upload_table(grpc::ServerContext& context, grpc::ServerReader<v1::TableChunk>& reader,
                             v1::SlopeTableInfo& response);
-  grpc::Status list_tables(grpc::ServerContext& context, v1::ListTablesResponse& response);
-  grpc::Status delete_table(grpc::ServerContext& context, const v1::DeleteTableRequest& request);
-  grpc::Status info(grpc::ServerContext& context, v1::InfoResponse& response);
+  grpc::Status list_tables(const v1::ListTablesRequest& request, v1::ListTablesResponse& response);
+  grpc::Status delete_table(const v1::DeleteTableRequest& request, v1::DeleteTableResponse& response);
+  grpc::Status info(const v1::InfoRequest& request, v1::InfoResponse& response);
   grpc::Status benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
                          grpc::ServerWriter<v1::BenchmarkProgress>& writer);
 
