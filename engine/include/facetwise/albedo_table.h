@@ -57,8 +57,8 @@ class AlbedoTable {
   };
 
   // Computes a model's table in the caller's TBB arena: the same bits on every machine. Of the model its distribution,
-  // masking, shadowing and table of slopes matter, and whether it is a dielectric. InvalidArgument: a model without visible normals, a table of slopes
-  // that is not radial, sizes that no table has.
+  // masking, shadowing and table of slopes matter, and whether it is a dielectric. InvalidArgument: a model without
+  // visible normals, a table of slopes that is not radial, sizes that no table has.
   static absl::StatusOr<std::shared_ptr<const AlbedoTable>> build(const Model& model, const Options& options);
 
   // As SlopeTable's. The bytes name the model; a table of slopes by SlopeTable::id().

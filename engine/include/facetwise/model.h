@@ -62,14 +62,13 @@ enum class Transport : std::uint8_t { radiance = 0, importance = 1 };
 // What is added for the light that is scattered more than once between microfacets, which single scattering loses.
 enum class Compensation : std::uint8_t {
   none = 0,
-  turquin = 1,  // weights and values times 1 + F0 (1 - E(i)) / E(i), E the directional albedo: Turquin 2019. Right in
-                // sum for F0 = 1; not reciprocal. Of a dielectric, which absorbs nothing: times 1 / (reflected and
-                // transmitted albedo). Without a mean slope
-  kelemen =
-      2,  // a further lobe, F_ms (1 - E(i)) (1 - E(o)) / (pi (1 - mean E)): Kelemen & Szirmay-Kalos 2001. Reciprocal,
-  // and right in sum for F0 = 1. F_ms: the reflectance of light scattered again and again by the mean F (Kulla &
-  // Conty 2017). Samples take it with probability 1 - E(i), by u3. Of
-  // reflections by conductors and schlick; sample_normal does not know it
+  // Weights and values times 1 + F0 (1 - E(i)) / E(i), E the directional albedo: Turquin 2019. Right in sum for F0 = 1; not
+  // reciprocal. Of a dielectric, which absorbs nothing: times 1 / (reflected and transmitted albedo). Without a mean slope.
+  turquin = 1,
+  // A further lobe, F_ms (1 - E(i)) (1 - E(o)) / (pi (1 - mean E)): Kelemen & Szirmay-Kalos 2001. Reciprocal, and right in
+  // sum for F0 = 1. F_ms: the reflectance of light scattered again and again by the mean F (Kulla & Conty 2017). Samples take
+  // it with probability 1 - E(i), by u3. Of reflections by conductors and schlick; sample_normal does not know it.
+  kelemen = 2,
 };
 
 // How directions are drawn. u1, u2, u3 are uniform in [0, 1); phi = 2 pi u2.
