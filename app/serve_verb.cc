@@ -21,17 +21,20 @@ struct ServeVerb {
   ServerOptions options;
   std::size_t max_message_mib = 16, max_mib_in_flight = 1024;
   std::size_t max_tables_mib = 256;
-  int drain_seconds = 10, read_seconds = 20, stream_idle_seconds = 300, table_idle_seconds = 3600;
+  int drain_seconds = 10, read_seconds = 20, write_seconds = 60, patience_ms = 2000, stream_idle_seconds = 300,
+      table_idle_seconds = 3600;
   std::string unix_mode = "0600";
 
   int run() {
-    if (max_mib_in_flight < 3 * max_message_mib)
+    if (max_mib_in_flight < 5 * max_message_mib)
       return fail("serve",
-                  invalid("--max-mib-in-flight: {} is below three times --max-message-mib ({}), which one call may "
-                          "hold; it could never be answered",
+                  invalid("--max-mib-in-flight: {} is below five times --max-message-mib ({}), which one call may "
+                          "need; it could never be answered",
                           max_mib_in_flight, max_message_mib));
     options.max_message_bytes = max_message_mib * kMiB;
     options.read_timeout = std::chrono::seconds(read_seconds);
+    options.write_timeout = std::chrono::seconds(write_seconds);
+    options.patience = std::chrono::milliseconds(patience_ms);
     options.stream_idle_timeout = std::chrono::seconds(stream_idle_seconds);
     options.max_bytes_in_flight = max_mib_in_flight * kMiB;
     options.max_tables_bytes = max_tables_mib * kMiB;
@@ -83,12 +86,19 @@ Examples:
   add_number("--threads", options.threads, 1, 4096, "Threads that compute; default as many as there are cores");
   add_number("--max-message-mib", arguments->max_message_mib, 1, 1024, "Largest request and response; default 16");
   add_number("--max-mib-in-flight", arguments->max_mib_in_flight, 1, 1 << 24,
-             "Requests and responses held at once; beyond, calls get RESOURCE_EXHAUSTED; default 1024");
+             "Messages held at once: half are requests on their way, which wait for room; beyond the rest, calls get "
+             "RESOURCE_EXHAUSTED; default 1024");
   add_number("--max-calls", options.max_calls, 1, 1 << 20,
-             "Calls at once; beyond, they get RESOURCE_EXHAUSTED; default 128");
+             "Calls worked on at once; beyond, they get RESOURCE_EXHAUSTED; default 128");
+  add_number("--max-open-calls", options.max_open_calls, 1, 1 << 20,
+             "Calls at once with those that wait for their client; default 1024");
   add_number("--read-seconds", arguments->read_seconds, 1, 86400, "Longest wait for a call's message; default 20");
   add_number("--stream-idle-seconds", arguments->stream_idle_seconds, 1, 86400,
              "Longest wait for a stream's next message; default 300");
+  add_number("--write-seconds", arguments->write_seconds, 1, 86400,
+             "Longest wait for a client to receive its answer; default 60");
+  add_number("--patience-ms", arguments->patience_ms, 1, 86400000,
+             "The same waits where others are refused or wait for room; default 2000");
   add_number("--max-tables-mib", arguments->max_tables_mib, 1, 1 << 20,
              "Tables of slopes that clients upload, together; default 256");
   add_number("--table-idle-seconds", arguments->table_idle_seconds, 1, 1 << 30,

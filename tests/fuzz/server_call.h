@@ -7,8 +7,7 @@
 
 #include "facetwise/albedo_table.h"
 #include "facetwise/batch.h"
-#include "grpcpp/server_context.h"
-#include "src/call.h"
+#include "src/answer.h"
 
 namespace facetwise::fuzz {
 
@@ -34,8 +33,8 @@ template <class Answer>
 void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   static Compute compute(1, {});
   static Tables tables(0, {});
-  static Watch watch;
-  static Admission admission(8, 64 * kMessageBytes);
+  static const std::atomic<bool> stop{false};
+  static Admission admission({8, 8, 64 * kMessageBytes, kMessageBytes, std::chrono::milliseconds(1000)});
   static const bool ready = [] {
     make_albedo_tables();
     return true;
@@ -48,9 +47,10 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
     slices.emplace_back(data + begin, length);
   }
   grpc::ByteBuffer request(slices.data(), slices.size());
-  grpc::ServerContext context;
-  Admission::Ticket ticket(admission);
-  const auto answered = answer(request, CallTools{{kMessageBytes}, compute, tables, ticket, watch, context});
+  Admission::Stay stay(
+      admission, [] {}, "");
+  const CallTools tools{{kMessageBytes}, compute, tables, stay, stop};
+  const auto answered = wait_for(answer(request, tools));
   // What is too much or malformed is refused; nothing else goes wrong.
   if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&
       answered.status().code() != absl::StatusCode::kResourceExhausted &&

@@ -15,12 +15,14 @@ inline std::string floats(std::size_t count, float value) {
   return {reinterpret_cast<const char*>(values.data()), count * sizeof(float)};
 }
 
-inline std::shared_ptr<grpc::Channel> open_channel(const std::string& address) {
+// `reads_ahead`: takes more of an answer than 64 KiB before it is read.
+inline std::shared_ptr<grpc::Channel> open_channel(const std::string& address, bool reads_ahead = true) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  if (!reads_ahead) arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 

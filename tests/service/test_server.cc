@@ -34,11 +34,14 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads);
   app.add_option("--max-message-bytes", options.max_message_bytes);
   app.add_option("--max-calls", options.max_calls);
+  app.add_option("--max-open-calls", options.max_open_calls);
   app.add_option("--max-bytes-in-flight", options.max_bytes_in_flight);
   app.add_option("--drain-ms", drain_ms);
-  long read_ms = 20000, idle_ms = 300000;
+  long read_ms = 20000, idle_ms = 300000, write_ms = 60000, patience_ms = 2000;
   app.add_option("--read-ms", read_ms);
   app.add_option("--idle-ms", idle_ms);
+  app.add_option("--write-ms", write_ms);
+  app.add_option("--patience-ms", patience_ms);
   long table_idle_ms = 3600000;
   app.add_option("--max-table-bytes", options.max_table_bytes);
   app.add_option("--max-tables-bytes", options.max_tables_bytes);
@@ -52,6 +55,8 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   options.drain_timeout = std::chrono::milliseconds(drain_ms);
   options.read_timeout = std::chrono::milliseconds(read_ms);
+  options.write_timeout = std::chrono::milliseconds(write_ms);
+  options.patience = std::chrono::milliseconds(patience_ms);
   options.stream_idle_timeout = std::chrono::milliseconds(idle_ms);
   options.table_idle_timeout = std::chrono::milliseconds(table_idle_ms);
   options.benchmark = report_steps;

@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
-#include "src/call.h"
+#include "src/answer.h"
 #include "wire/fields.h"
 #include "wire/message_reader.h"
 #include "wire/message_writer.h"
@@ -350,31 +350,26 @@ Batch piece(const Batch& batch, std::size_t begin, std::size_t end) {
 
 }  // namespace
 
-absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const CallTools& tools) {
-  // Received, decoded.
-  if (auto status = tools.ticket.hold(2 * request.Length()); !status.ok()) return status;
+Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, const CallTools& tools) {
+  if (auto status = co_await begin_answer(request, tools); !status.ok()) co_return status;
   Decoder decoder(request);
   Batch batch;
-  if (auto status = decoder.read(); !status.ok()) return status;
+  if (auto status = decoder.read(); !status.ok()) co_return status;
   request.Clear();
-  if (auto status = decoder.make_batch(tools.limits, tools.tables, batch); !status.ok()) return status;
+  if (auto status = decoder.make_batch(tools.limits, tools.tables, batch); !status.ok()) co_return status;
 
   const Response response(decoder.outputs(), decoder.lanes());
   if (response.bytes() > tools.limits.message_bytes)
-    return absl::InvalidArgumentError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
-                                                   " lanes are above the limit of ", tools.limits.message_bytes,
-                                                   ": send fewer lanes"));
-  if (auto status = tools.ticket.hold(response.bytes()); !status.ok()) return status;
+    co_return absl::InvalidArgumentError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
+                                                      " lanes are above the limit of ", tools.limits.message_bytes,
+                                                      ": send fewer lanes"));
+  if (auto status = tools.stay.hold(response.bytes()); !status.ok()) co_return status;
   wire::MessageWriter writer = response.make(batch);
   // As a whole: what is wrong with a piece would be told with the piece's sizes.
-  if (auto status = check(decoder.operation(), batch); !status.ok()) return status;
-  // Shorter calls are done before anybody could stop them.
-  constexpr std::size_t kLong = std::size_t{1} << 18;
-  std::optional<Watch::Computing> computing;
-  if (batch.lanes >= kLong) computing.emplace(tools.watch, tools.context);
+  if (auto status = check(decoder.operation(), batch); !status.ok()) co_return status;
   absl::StatusOr<Statistics> statistics = Statistics{};
-  tools.compute.each(batch.lanes, [&](std::size_t begin, std::size_t end, Execution execution) {
-    if (computing) execution.stop = &computing->stop();
+  auto computed = tools.compute.each(batch.lanes, [&](std::size_t begin, std::size_t end, Execution execution) {
+    execution.stop = &tools.stop;
     const auto some = run(decoder.operation(), piece(batch, begin, end), execution);
     if (some.ok())
       *statistics += *some;
@@ -382,7 +377,8 @@ absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const C
       statistics = some.status();
     return some.ok();
   });
-  if (!statistics.ok()) return statistics.status();
+  co_await computed;
+  if (!statistics.ok()) co_return statistics.status();
 
   v1::Statistics counts;
   counts.set_accepted(statistics->accepted);
@@ -390,7 +386,16 @@ absl::StatusOr<grpc::ByteBuffer> answer_batch(grpc::ByteBuffer& request, const C
   counts.set_smooth(statistics->smooth);
   counts.set_invalid(statistics->invalid);
   writer.message(v1::BatchResponse::kStatisticsFieldNumber, counts);
-  return std::move(writer).finish();
+  co_return std::move(writer).finish();
+}
+
+Task<absl::Status> begin_answer(const grpc::ByteBuffer& request, const CallTools& tools) {
+  // Columns of a short call, as Compute has it.
+  constexpr std::size_t kShort = std::size_t{1} << 19;
+  if (auto status = tools.stay.work(); !status.ok()) co_return status;
+  if (auto status = tools.stay.hold(2 * request.Length()); !status.ok()) co_return status;
+  co_await tools.compute.turn(request.Length() > kShort);
+  co_return absl::OkStatus();
 }
 
 absl::Status invalid_field(absl::string_view field, absl::string_view what) {

@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
 #include "facetwise/v1/sampler.pb.h"
-#include "src/call.h"
+#include "src/answer.h"
 #include "wire/message_reader.h"
 #include "wire/message_writer.h"
 
@@ -103,19 +103,19 @@ absl::Status check_request(const Decoded& decoded, const Limits& limits) {
 
 }  // namespace
 
-absl::StatusOr<grpc::ByteBuffer> answer_compact(grpc::ByteBuffer& request, const CallTools& tools) {
-  if (auto status = tools.ticket.hold(2 * request.Length()); !status.ok()) return status;
+Task<absl::StatusOr<grpc::ByteBuffer>> answer_compact(grpc::ByteBuffer& request, const CallTools& tools) {
+  if (auto status = co_await begin_answer(request, tools); !status.ok()) co_return status;
   Decoded decoded;
-  if (auto status = Decoder(request).read(decoded); !status.ok()) return status;
+  if (auto status = Decoder(request).read(decoded); !status.ok()) co_return status;
   request.Clear();
   static constexpr std::uint8_t kNothing = 0;
   if (decoded.lanes == 0 && !decoded.status.present()) decoded.status = {&kNothing, 0};
-  if (auto status = check_request(decoded, tools.limits); !status.ok()) return status;
+  if (auto status = check_request(decoded, tools.limits); !status.ok()) co_return status;
 
   // How many are accepted is known afterwards: compacts into a block, then copies what there is.
   const std::size_t columns = 1 + decoded.columns.size();
   const std::size_t room = round_up(decoded.lanes * 4);
-  if (auto status = tools.ticket.hold(2 * columns * room); !status.ok()) return status;
+  if (auto status = tools.stay.hold(2 * columns * room); !status.ok()) co_return status;
   const wire::Block compacted(columns * room);
   const auto values = [&](std::size_t k) { return compacted.data() + k * room; };
   Compaction compaction;
@@ -127,11 +127,12 @@ absl::StatusOr<grpc::ByteBuffer> answer_compact(grpc::ByteBuffer& request, const
     dense.push_back({decoded.columns[k - 1], {reinterpret_cast<float*>(values(k)), decoded.lanes}});
   compaction.columns = dense;
   absl::StatusOr<std::size_t> accepted;
-  tools.compute.each(0, [&](std::size_t, std::size_t, const Execution& execution) {
+  auto computed = tools.compute.each(0, [&](std::size_t, std::size_t, const Execution& execution) {
     accepted = compact(compaction, execution);
     return true;
   });
-  if (!accepted.ok()) return accepted.status();
+  co_await computed;
+  if (!accepted.ok()) co_return accepted.status();
 
   v1::CompactResponse small;
   small.set_accepted(*accepted);
@@ -141,7 +142,7 @@ absl::StatusOr<grpc::ByteBuffer> answer_compact(grpc::ByteBuffer& request, const
     const int field = k == 0 ? v1::CompactResponse::kIndexFieldNumber : v1::CompactResponse::kColumnsFieldNumber;
     std::memcpy(writer.column(field, *accepted * 4), values(k), *accepted * 4);
   }
-  return std::move(writer).finish();
+  co_return std::move(writer).finish();
 }
 
 }  // namespace facetwise

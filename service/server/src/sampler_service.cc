@@ -3,17 +3,34 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
 #include "facetwise/slope_table.h"
+#include "grpcpp/impl/codegen/server_callback_handlers.h"
 #include "src/machine.h"
 #include "wire/status.h"
 
 namespace facetwise {
 namespace {
 
+using grpc::ByteBuffer;
 using grpc::internal::RpcMethod;
 using grpc::internal::RpcServiceMethod;
 using wire::to_grpc;
 
-grpc::Status error(grpc::StatusCode code, const std::string& message) { return {code, message}; }
+absl::Status cancelled() { return absl::CancelledError("the message did not come in time"); }
+
+absl::Status shuts_down() { return absl::UnavailableError("the server is shutting down"); }
+
+template <class Message>
+bool parse(ByteBuffer& bytes, Message& message) {
+  return grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok();
+}
+
+template <class Message>
+ByteBuffer serialise(const Message& message) {
+  ByteBuffer bytes;
+  bool own = false;
+  grpc::SerializationTraits<Message>::Serialize(message, &bytes, &own);
+  return bytes;
+}
 
 void describe(const Tables::Entry& entry, v1::SlopeTableInfo& info) {
   info.set_id(entry.table->id());
@@ -22,151 +39,171 @@ void describe(const Tables::Entry& entry, v1::SlopeTableInfo& info) {
   info.set_idle_seconds(entry.idle.count());
 }
 
+// Of an UploadTable call that is done.
+ByteBuffer description(std::shared_ptr<const SlopeTable> table) {
+  v1::SlopeTableInfo info;
+  describe({std::move(table), {}}, info);
+  return serialise(info);
+}
+
 }  // namespace
 
 SamplerService::SamplerService(const ServerOptions& options)
     : options_(options),
       limits_{options.max_message_bytes},
-      admission_(options.max_calls, options.max_bytes_in_flight),
+      admission_({.calls = options.max_calls,
+                  .open = options.max_open_calls,
+                  .bytes = options.max_bytes_in_flight,
+                  .message_bytes = options.max_message_bytes,
+                  .patience = options.patience}),
       compute_(options.threads, options.execution),
       tables_(options.max_tables_bytes, options.table_idle_timeout),
       tokens_(options.token_file) {
-  add("/facetwise.v1.Sampler/Run", answer_batch, Messages::one);
-  add("/facetwise.v1.Sampler/RunStream", answer_batch, Messages::many);
-  add("/facetwise.v1.Sampler/Compact", answer_compact, Messages::one);
-  add("/facetwise.v1.Sampler/CompactStream", answer_compact, Messages::many);
-  AddMethod(new RpcServiceMethod(
-      "/facetwise.v1.Sampler/UploadTable", RpcMethod::CLIENT_STREAMING,
-      new grpc::internal::ClientStreamingHandler<SamplerService, v1::TableChunk, v1::SlopeTableInfo>(
-          [](SamplerService* service, grpc::ServerContext* context, grpc::ServerReader<v1::TableChunk>* reader,
-             v1::SlopeTableInfo* response) { return service->upload_table(*context, *reader, *response); },
-          this)));
+  const auto one = [this](Answer answer) { return [this, answer](Call& call) { return answer_one(answer, call); }; };
+  const auto many = [this](Answer answer) { return [this, answer](Call& call) { return answer_many(answer, call); }; };
+  add("/facetwise.v1.Sampler/Run", one(with_tools(answer_batch)));
+  add("/facetwise.v1.Sampler/RunStream", many(with_tools(answer_batch)));
+  add("/facetwise.v1.Sampler/Compact", one(with_tools(answer_compact)));
+  add("/facetwise.v1.Sampler/CompactStream", many(with_tools(answer_compact)));
+  add("/facetwise.v1.Sampler/UploadTable", [this](Call& call) { return upload_table(call); });
   add_small("/facetwise.v1.Sampler/ListTables", &SamplerService::list_tables);
   add_small("/facetwise.v1.Sampler/DeleteTable", &SamplerService::delete_table);
   add_small("/facetwise.v1.Sampler/Info", &SamplerService::info);
-  AddMethod(new RpcServiceMethod(
-      "/facetwise.v1.Sampler/Benchmark", RpcMethod::SERVER_STREAMING,
-      new grpc::internal::ServerStreamingHandler<SamplerService, v1::BenchmarkRequest, v1::BenchmarkProgress>(
-          [](SamplerService* service, grpc::ServerContext* context, const v1::BenchmarkRequest* request,
-             grpc::ServerWriter<v1::BenchmarkProgress>* writer) {
-            return service->benchmark(*context, *request, *writer);
-          },
-          this)));
+  add("/facetwise.v1.Sampler/Benchmark", [this](Call& call) { return benchmark(call); });
+}
+
+SamplerService::~SamplerService() {
+  if (benchmark_thread_.joinable()) benchmark_thread_.join();
+}
+
+void SamplerService::add(const char* name, Call::Course course) {
+  const auto admitted = [this, course](Call& call) -> Task<Call::End> {
+    if (auto status = tokens_.check(call.context()); !status.ok()) co_return {to_grpc(status)};
+    if (auto status = call.stay().enter(); !status.ok()) co_return {to_grpc(status)};
+    auto rest = course(call);
+    co_return co_await rest;
+  };
+  AddMethod(new RpcServiceMethod(name, RpcMethod::BIDI_STREAMING, nullptr));
+  MarkMethodRawCallback(methods_++, new grpc::internal::CallbackBidiHandler<ByteBuffer, ByteBuffer>(
+                                        [this, admitted](grpc::CallbackServerContext* context) {
+                                          return new Call(*context, admission_, {options_.write_timeout}, admitted);
+                                        }));
+}
+
+SamplerService::Answer SamplerService::with_tools(AnswerColumns answer) {
+  return [this, answer](ByteBuffer& request, Call& call) -> Task<absl::StatusOr<ByteBuffer>> {
+    const CallTools tools{limits_, compute_, tables_, call.stay(), call.stop()};
+    auto answering = answer(request, tools);
+    auto answered = co_await answering;
+    // The request is no more.
+    call.stay().hold_no_more_than(answered.ok() ? answered->Length() : 0);
+    co_return answered;
+  };
 }
 
 template <class Request, class Response>
-void SamplerService::add_small(const char* name, grpc::Status (SamplerService::*answer)(const Request&, Response&)) {
-  AddMethod(new RpcServiceMethod(
-      name, RpcMethod::NORMAL_RPC,
-      new grpc::internal::RpcMethodHandler<SamplerService, Request, Response>(
-          [answer](SamplerService* service, grpc::ServerContext* context, const Request* request, Response* response) {
-            const auto status = service->tokens_.check(*context);
-            return status.ok() ? (service->*answer)(*request, *response) : to_grpc(status);
-          },
-          this)));
-}
-
-void SamplerService::add(const char* name, Answer answer, Messages messages) {
-  AddMethod(
-      new RpcServiceMethod(name, RpcMethod::BIDI_STREAMING,
-                           new grpc::internal::BidiStreamingHandler<SamplerService, grpc::ByteBuffer, grpc::ByteBuffer>(
-                               [=](SamplerService* service, grpc::ServerContext* context, Stream* stream) {
-                                 return messages == Messages::one ? service->answer_one(answer, *context, *stream)
-                                                                  : service->answer_many(answer, *context, *stream);
-                               },
-                               this)));
-}
-
-grpc::Status SamplerService::answer_one(Answer answer, grpc::ServerContext& context, Stream& stream) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
-  Admission::Ticket ticket(admission_);
-  if (!ticket.status().ok()) return to_grpc(ticket.status());
-  grpc::ByteBuffer request, another;
-  {
-    const Watch::Reading reading(watch_, context, options_.read_timeout);
-    if (!stream.Read(&request) || context.IsCancelled()) return grpc::Status::CANCELLED;
-    // A call of one message ends its side with it.
-    if (stream.Read(&another))
-      return error(grpc::StatusCode::INVALID_ARGUMENT, "message: more than one, in a call that takes one");
-    if (context.IsCancelled()) return grpc::Status::CANCELLED;
-  }
-  auto answered = answer(request, {limits_, compute_, tables_, ticket, watch_, context});
-  if (!answered.ok()) return to_grpc(answered.status());
-  stream.WriteLast(*answered, {});
-  return grpc::Status::OK;
-}
-
-grpc::Status SamplerService::answer_many(Answer answer, grpc::ServerContext& context, Stream& stream) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
-  Admission::Ticket ticket(admission_);
-  if (!ticket.status().ok()) return to_grpc(ticket.status());
-  for (grpc::ByteBuffer request;;) {
-    {
-      const Watch::Reading reading(watch_, context, options_.stream_idle_timeout);
-      if (!stream.Read(&request)) return context.IsCancelled() ? grpc::Status::CANCELLED : grpc::Status::OK;
-    }
-    if (context.IsCancelled()) return grpc::Status::CANCELLED;
-    auto answered = answer(request, {limits_, compute_, tables_, ticket, watch_, context});
-    if (!answered.ok()) return to_grpc(answered.status());
-    if (!stream.Write(*answered)) return grpc::Status::CANCELLED;  // the client has gone
-    ticket.release();
-    if (admission_.closed()) return error(grpc::StatusCode::UNAVAILABLE, "the server is shutting down");
-  }
-}
-
-grpc::Status SamplerService::upload_table(grpc::ServerContext& context, grpc::ServerReader<v1::TableChunk>& reader,
-                                          v1::SlopeTableInfo& response) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
-  Admission::Ticket ticket(admission_);
-  if (!ticket.status().ok()) return to_grpc(ticket.status());
-  v1::TableChunk chunk;
-  const auto read = [&] {
-    const Watch::Reading reading(watch_, context, options_.read_timeout);
-    return reader.Read(&chunk) && !context.IsCancelled();
+void SamplerService::add_small(const char* name, absl::Status (SamplerService::*answer)(const Request&, Response&)) {
+  const Answer small = [this, answer](ByteBuffer& bytes, Call&) -> Task<absl::StatusOr<ByteBuffer>> {
+    Request request;
+    Response response;
+    if (!parse(bytes, request)) co_return damaged_message();
+    if (auto status = (this->*answer)(request, response); !status.ok()) co_return status;
+    co_return serialise(response);
   };
-  const auto invalid = [](const std::string& message) { return error(grpc::StatusCode::INVALID_ARGUMENT, message); };
-  if (!read()) return context.IsCancelled() ? grpc::Status::CANCELLED : invalid("message: none");
-  const std::uint64_t id = chunk.id(), bytes = chunk.bytes();
-  if (auto kept = tables_.find(id)) {
-    describe({kept, {}}, response);
-    return grpc::Status::OK;
+  add(name, [this, small](Call& call) { return answer_one(small, call); });
+}
+
+Task<absl::StatusOr<ByteBuffer>> SamplerService::read_one(Call& call) {
+  auto reading = call.read(options_.read_timeout);
+  auto request = co_await reading;
+  if (!request) co_return call.cancelled() ? cancelled() : absl::InvalidArgumentError("message: none");
+  // A call of one message ends its side with it.
+  auto end = call.read(options_.read_timeout);
+  const auto another = co_await end;
+  call.stay().leave_room();
+  if (another) co_return absl::InvalidArgumentError("message: more than one, in a call that takes one");
+  if (call.cancelled()) co_return cancelled();
+  co_return *std::move(request);
+}
+
+Task<Call::End> SamplerService::answer_one(Answer answer, Call& call) {
+  auto reading = read_one(call);
+  auto request = co_await reading;
+  if (!request.ok()) co_return {to_grpc(request.status())};
+  auto answering = answer(*request, call);
+  auto answered = co_await answering;
+  if (!answered.ok()) co_return {to_grpc(answered.status())};
+  co_return {grpc::Status::OK, *std::move(answered)};
+}
+
+Task<Call::End> SamplerService::answer_many(Answer answer, Call& call) {
+  for (;;) {
+    auto reading = call.read(options_.stream_idle_timeout);
+    auto request = co_await reading;
+    call.stay().leave_room();
+    if (!request) co_return {call.cancelled() ? to_grpc(cancelled()) : grpc::Status::OK};
+    auto answering = answer(*request, call);
+    const auto answered = co_await answering;
+    if (!answered.ok()) co_return {to_grpc(answered.status())};
+    auto writing = call.write(*answered);
+    if (!co_await writing) co_return {to_grpc(cancelled())};
+    call.stay().release();
+    if (admission_.closed()) co_return {to_grpc(shuts_down())};
   }
-  if (bytes > options_.max_table_bytes)
-    return invalid(absl::StrCat("bytes: ", bytes, " are above the limit of ", options_.max_table_bytes));
-  // As received, and as read.
-  if (auto status = ticket.hold(2 * bytes); !status.ok()) return to_grpc(status);
+}
+
+Task<Call::End> SamplerService::upload_table(Call& call) {
+  std::optional<v1::TableChunk> first;
   std::string data;
-  data.reserve(bytes);
-  do {
-    if (chunk.data().size() > bytes - data.size())
-      return invalid(absl::StrCat("data: more than the ", bytes, " bytes that were announced"));
+  for (;;) {
+    auto reading = call.read(options_.read_timeout);
+    auto bytes = co_await reading;
+    if (call.cancelled()) co_return {to_grpc(cancelled())};
+    if (!bytes && !first) co_return {to_grpc(absl::InvalidArgumentError("message: none"))};
+    if (!bytes)
+      co_return {
+          to_grpc(invalid_field("data", absl::StrCat(data.size(), " of the ", first->bytes(), " bytes announced")))};
+    v1::TableChunk chunk;
+    if (!parse(*bytes, chunk)) co_return {to_grpc(damaged_message())};
+    call.stay().leave_room();
+    if (!first) {
+      first = chunk;
+      if (auto kept = tables_.find(first->id())) co_return {grpc::Status::OK, description(kept)};
+      if (first->bytes() > options_.max_table_bytes)
+        co_return {to_grpc(invalid_field(
+            "bytes", absl::StrCat(first->bytes(), " are above the limit of ", options_.max_table_bytes)))};
+      // As received, and as read.
+      if (auto status = call.stay().hold(2 * first->bytes()); !status.ok()) co_return {to_grpc(status)};
+      data.reserve(first->bytes());
+    }
+    if (chunk.data().size() > first->bytes() - data.size())
+      co_return {
+          to_grpc(invalid_field("data", absl::StrCat("more than the ", first->bytes(), " bytes that were announced")))};
     data += chunk.data();
-  } while (data.size() < bytes && read());
-  if (context.IsCancelled()) return grpc::Status::CANCELLED;
-  if (data.size() < bytes) return invalid(absl::StrCat("data: ", data.size(), " of the ", bytes, " bytes announced"));
+    if (data.size() == first->bytes()) break;
+  }
+  co_await compute_.turn(true);
   const auto table = SlopeTable::parse(data);
   if (!table.ok())
-    return to_grpc(absl::Status(table.status().code(), absl::StrCat("data: ", table.status().message())));
-  if ((*table)->id() != id) return invalid("id: not that of the table");
-  if (auto status = tables_.put(*table); !status.ok()) return to_grpc(status);
-  describe({*table, {}}, response);
-  return grpc::Status::OK;
+    co_return {to_grpc(absl::Status(table.status().code(), absl::StrCat("data: ", table.status().message())))};
+  if ((*table)->id() != first->id()) co_return {to_grpc(invalid_field("id", "not that of the table"))};
+  if (auto status = tables_.put(*table); !status.ok()) co_return {to_grpc(status)};
+  co_return {grpc::Status::OK, description(*table)};
 }
 
-grpc::Status SamplerService::list_tables(const v1::ListTablesRequest&, v1::ListTablesResponse& response) {
+absl::Status SamplerService::list_tables(const v1::ListTablesRequest&, v1::ListTablesResponse& response) {
   for (const Tables::Entry& entry : tables_.list()) describe(entry, *response.add_tables());
   response.set_max_bytes(tables_.max_bytes());
   response.set_max_idle_seconds(std::chrono::duration<double>(tables_.max_idle()).count());
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status SamplerService::delete_table(const v1::DeleteTableRequest& request, v1::DeleteTableResponse&) {
-  if (tables_.erase(request.id())) return grpc::Status::OK;
-  return error(grpc::StatusCode::NOT_FOUND,
-               absl::StrCat("id: no table ", absl::Hex(request.id(), absl::kZeroPad16), " here"));
+absl::Status SamplerService::delete_table(const v1::DeleteTableRequest& request, v1::DeleteTableResponse&) {
+  if (tables_.erase(request.id())) return absl::OkStatus();
+  return absl::NotFoundError(absl::StrCat("id: no table ", absl::Hex(request.id(), absl::kZeroPad16), " here"));
 }
 
-grpc::Status SamplerService::info(const v1::InfoRequest&, v1::InfoResponse& response) {
+absl::Status SamplerService::info(const v1::InfoRequest&, v1::InfoResponse& response) {
   const std::string_view release = version();
   response.set_version(std::string(release));
   response.set_target(std::string(name(resolve(compute_.execution().target).value_or(Target::best))));
@@ -176,35 +213,48 @@ grpc::Status SamplerService::info(const v1::InfoRequest&, v1::InfoResponse& resp
   static const std::string cpu = cpu_name();
   response.set_cpu(cpu);
   response.set_benchmark_allowed(options_.allow_benchmark && options_.benchmark);
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status SamplerService::benchmark(grpc::ServerContext& context, const v1::BenchmarkRequest& request,
-                                       grpc::ServerWriter<v1::BenchmarkProgress>& writer) {
-  if (auto status = tokens_.check(context); !status.ok()) return to_grpc(status);
+Task<Call::End> SamplerService::benchmark(Call& call) {
+  auto reading = read_one(call);
+  auto bytes = co_await reading;
+  if (!bytes.ok()) co_return {to_grpc(bytes.status())};
+  v1::BenchmarkRequest request;
+  if (!parse(*bytes, request)) co_return {to_grpc(damaged_message())};
   constexpr std::size_t kLongestFilter = 1000;
   if (!options_.allow_benchmark || !options_.benchmark)
-    return error(grpc::StatusCode::PERMISSION_DENIED, "benchmarks are off: start the server with --allow-benchmark");
+    co_return {to_grpc(absl::PermissionDeniedError("benchmarks are off: start the server with --allow-benchmark"))};
   if (request.filter().size() > kLongestFilter)
-    return error(grpc::StatusCode::INVALID_ARGUMENT,
-                 absl::StrCat("filter: ", request.filter().size(), " bytes, at most ", kLongestFilter));
+    co_return {
+        to_grpc(invalid_field("filter", absl::StrCat(request.filter().size(), " bytes, at most ", kLongestFilter)))};
   if (const double s = request.min_seconds(); s != 0 && !(s > 0 && s <= 10))
-    return error(grpc::StatusCode::INVALID_ARGUMENT, absl::StrCat("min_seconds: ", s, " is not in (0, 10], nor 0"));
-  Admission::Ticket ticket(admission_);
-  if (!ticket.status().ok()) return to_grpc(ticket.status());
+    co_return {to_grpc(invalid_field("min_seconds", absl::StrCat(s, " is not in (0, 10], nor 0")))};
   if (benchmark_runs_.exchange(true))
-    return error(grpc::StatusCode::RESOURCE_EXHAUSTED, "another benchmark runs: try again later");
+    co_return {to_grpc(absl::ResourceExhaustedError("another benchmark runs: try again later"))};
   struct Done {
     std::atomic<bool>& runs;
     ~Done() { runs = false; }
   } done{benchmark_runs_};
+  // It takes seconds, so it has a thread of its own.
+  struct OnOwnThread {
+    std::thread& thread;
+    std::mutex& mutex;
+    bool await_ready() const { return false; }
+    void await_suspend(std::coroutine_handle<> call) {
+      const std::lock_guard lock(mutex);
+      if (thread.joinable()) thread.join();
+      thread = std::thread([call] { call.resume(); });
+    }
+    void await_resume() const {}
+  } on_own_thread{benchmark_thread_, benchmark_mutex_};
+  co_await on_own_thread;
   const absl::Status status = options_.benchmark(request, [&](const v1::BenchmarkProgress& progress) {
-    return !admission_.closed() && !context.IsCancelled() && writer.Write(progress);
+    return !admission_.closed() && !call.cancelled() && wait_for(call.write(serialise(progress)));
   });
-  if (!status.ok()) return to_grpc(status);
-  if (context.IsCancelled()) return grpc::Status::CANCELLED;
-  if (admission_.closed()) return error(grpc::StatusCode::UNAVAILABLE, "the server is shutting down");
-  return grpc::Status::OK;
+  if (!status.ok()) co_return {to_grpc(status)};
+  if (call.cancelled()) co_return {to_grpc(cancelled())};
+  co_return {admission_.closed() ? to_grpc(shuts_down()) : grpc::Status::OK};
 }
 
 }  // namespace facetwise

@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <mutex>
@@ -21,6 +22,7 @@ namespace facetwise {
 namespace {
 
 constexpr std::chrono::milliseconds kPause{100};
+constexpr int kReflectionThreads = 16;
 // Calls that are not ours (a health watch, a reflection stream) have this long when ours are done.
 constexpr std::chrono::milliseconds kLinger{300};
 
@@ -36,9 +38,10 @@ absl::Status check_options(const ServerOptions& options) {
   if (options.max_message_bytes < 4096 || options.max_message_bytes > std::size_t{1} << 30)
     return invalid("max_message_bytes: not from 4 KiB to 1 GiB");
   if (options.max_calls < 1) return invalid("max_calls: below 1");
-  if (options.max_bytes_in_flight / 3 < options.max_message_bytes)
+  if (options.max_open_calls < 1) return invalid("max_open_calls: below 1");
+  if (options.max_bytes_in_flight / (Admission::kMessagesHeld + 1) < options.max_message_bytes)
     return invalid(
-        "max_bytes_in_flight: below three times max_message_bytes, what one call may hold: it could never be answered");
+        "max_bytes_in_flight: below five times max_message_bytes, what one call may need: it could never be answered");
   if (!resolve(options.execution.target))
     return absl::FailedPreconditionError(
         absl::StrCat("target: this CPU or build has no ", std::string(name(options.execution.target))));
@@ -88,11 +91,14 @@ absl::Status GrpcServer::listen() {
   builder.SetMaxSendMessageSize(-1);  // answer_batch() keeps responses below the limit
   // Two servers on one port would share its connections without a word.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options_.max_calls + 16);
-  // A synchronous server has one thread per call; what is above our own limit on calls is for health checks,
-  // reflection, and for saying no.
+  // One client leaves places for others; what it asks for beyond waits in its own gRPC.
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, std::max(options_.max_open_calls / 4, 16));
+  // What comes before it was asked for; estimating the bandwidth would raise it.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, static_cast<int>(Admission::kReadAhead));
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  // Only reflection, which is gRPC's own, has a thread per call.
   grpc::ResourceQuota quota;
-  quota.SetMaxThreads(options_.max_calls + 64);
+  quota.SetMaxThreads(kReflectionThreads);
   builder.SetResourceQuota(quota);
 
   const auto tls = credentials(options_);

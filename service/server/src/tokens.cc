@@ -45,7 +45,7 @@ void Tokens::read_if_changed() {
   }
 }
 
-absl::Status Tokens::check(const grpc::ServerContext& context) {
+absl::Status Tokens::check(const grpc::CallbackServerContext& context) {
   if (path_.empty()) return absl::OkStatus();
   constexpr absl::string_view kScheme = "Bearer ";
   const auto& metadata = context.client_metadata();

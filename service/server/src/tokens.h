@@ -22,7 +22,7 @@ class Tokens {
   absl::Status read();
 
   // OK or UNAUTHENTICATED.
-  absl::Status check(const grpc::ServerContext& context);
+  absl::Status check(const grpc::CallbackServerContext& context);
 
  private:
   void read_if_changed();

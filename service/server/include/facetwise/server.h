@@ -45,16 +45,22 @@ struct ServerOptions {
   // Largest request that is read and largest response that is made. A call's lanes are at most a quarter of
   // it, so that a small request cannot ask for unbounded work.
   std::size_t max_message_bytes = std::size_t{16} << 20;
-  // Calls (and streams) at once; one more gets RESOURCE_EXHAUSTED.
+  // Calls (and messages of streams) that are worked on at once, until their answers have left; one more gets
+  // RESOURCE_EXHAUSTED. Calls that are open, those that wait for their client among them.
   int max_calls = 128;
-  // Bytes of requests (twice: as received, and as decoded) and responses held at once; a call that would go above gets
-  // RESOURCE_EXHAUSTED. Three times max_message_bytes at least.
+  int max_open_calls = 1024;
+  // Bytes of messages at once: half are for requests on their way, each of which counts as max_message_bytes and waits
+  // until there is room; the rest are for requests (as received, and as decoded) and answers, and a call that would go
+  // above gets RESOURCE_EXHAUSTED. Five times max_message_bytes at least.
   std::size_t max_bytes_in_flight = std::size_t{1} << 30;
   // Tables of slopes that clients upload: largest of one, of all together, and how long one stays that nobody uses.
   std::size_t max_table_bytes = std::size_t{64} << 20, max_tables_bytes = std::size_t{256} << 20;
   std::chrono::milliseconds table_idle_timeout{3600000};
-  // How long a call may take to send its message, and a stream may leave between messages, before it is cancelled.
-  std::chrono::milliseconds read_timeout{20000}, stream_idle_timeout{300000};
+  // How long a call may take to send its message, a stream may leave between messages, and a client may take to receive
+  // an answer, before the call is cancelled.
+  std::chrono::milliseconds read_timeout{20000}, stream_idle_timeout{300000}, write_timeout{60000};
+  // The same where another call has been refused, or waits, for want of room: those that wait longest for their client go.
+  std::chrono::milliseconds patience{2000};
   // How long drain() waits for calls in flight before it ends them.
   std::chrono::milliseconds drain_timeout{10000};
   // Which kernels run. Its thread setting is not used.
