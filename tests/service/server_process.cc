@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 namespace facetwise::testing {
 
@@ -66,6 +67,13 @@ ServerProcess::~ServerProcess() {
 
 void ServerProcess::signal(int number) const {
   if (process_ > 0) kill(process_, number);
+}
+
+long ServerProcess::status(const std::string& field) const {
+  std::ifstream file("/proc/" + std::to_string(process_) + "/status");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with(field + ":")) return std::stol(line.substr(field.size() + 1));
+  return -1;
 }
 
 int ServerProcess::wait() {

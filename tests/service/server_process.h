@@ -32,6 +32,8 @@ class ServerProcess {
   bool ready() const { return ready_; }
   const std::vector<std::string>& addresses() const { return addresses_; }
   void signal(int number) const;
+  // Of the process now, from /proc/PID/status: "VmRSS" (in KiB), "Threads".
+  long status(const std::string& field) const;
   // Waits until it ends: the exit code, or minus the signal.
   int wait();
   // What it wrote to stderr. After wait().
