@@ -72,6 +72,9 @@ void EngineArguments::add_remote(CLI::App& app) {
       ->allow_extra_args(false)  // so that `--remote A B` is an error
       ->option_text("ADDRESS[,ADDRESS...]");
   add_connection(app, connection);
+  connection.absent = [](const std::string& message) {
+    fmt::print(stderr, "facetwise: {}; going on with the others\n", message);
+  };
 }
 
 void add_connection(CLI::App& app, ConnectOptions& connection) {

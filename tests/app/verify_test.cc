@@ -75,7 +75,7 @@ TEST(Verify, NothingWrong) {
 TEST(Verify, FindsEveryLieInItsBatch) {
   using Lie = LyingEngine::Lie;
   for (const Lie lie : {Lie::bit, Lie::status, Lie::statistics, Lie::unwritten})
-    for (std::size_t wrong = 0; wrong < 16; ++wrong) {
+    for (const std::size_t wrong : {0, 7, 15}) {
       const auto verification = verify_with(lie, wrong);
       EXPECT_FALSE(verification.equal());
       for (std::size_t k = 0; k < verification.batches.size(); ++k)

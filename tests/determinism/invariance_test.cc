@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "support/call.h"
+#include "support/counts.h"
 
 namespace facetwise::test {
 namespace {
@@ -114,7 +115,7 @@ TEST_P(Invariance, ActiveLanesInAnyOrderAndNoOthers) {
 TEST_P(Invariance, OneValueForAllLanes) {
   for (std::size_t k = 0; k < lanes_.in.size(); ++k) {
     if (!reads(GetParam(), input_fields()[k])) continue;
-    for (const float value : {0.3f, 0.0f, 1.0f, 5e-5f}) {
+    for (const float value : kQuick ? std::vector{0.3f} : std::vector{0.3f, 0.0f, 1.0f, 5e-5f}) {
       Lanes expanded = lanes_;
       std::fill(expanded.in[k].begin(), expanded.in[k].end(), value);
       Answer answer;

@@ -9,7 +9,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kLanes = kQuick ? 3000 : 60'000;
+constexpr std::size_t kLanes = kQuick ? 3000 : 30'000;
 
 void expect_targets_agree(const Lanes& lanes) {
   for (const Call& call : all_calls()) {

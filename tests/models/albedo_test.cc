@@ -127,7 +127,7 @@ double tolerance(const Places& at, std::size_t n) {
 void expect_the_references(const Model& model) {
   for (const bool isotropic : {true, false}) {
     // Closer to the horizon and to a mirror the reference's quadrature takes minutes a point, and may fail.
-    const Places at = places(model, 10, isotropic, isotropic ? 1 : 2, 1e-3, 1e-2f);
+    const Places at = places(model, long_run() ? 10 : 4, isotropic, isotropic ? 1 : 2, 1e-3, 1e-2f);
     const std::vector<float> got = albedos(model, at);
     for (std::size_t n = 0; n < at.size(); ++n) {
       const reference::Surface surface{.model = model, .alpha = {at.alpha_x[n], at.alpha_y[n]}};
@@ -138,10 +138,9 @@ void expect_the_references(const Model& model) {
 
 // Everywhere: the mean weight of other samples than those that made the table.
 void expect_the_mean_weight(const Model& model) {
-  constexpr std::size_t kSamples = 1 << 16;
-  std::vector<float> weight(kSamples);
+  std::vector<float> weight(1 << (long_run() ? 16 : 15));
   for (const bool isotropic : {true, false}) {
-    const Places at = places(model, 400, isotropic, isotropic ? 3 : 4, 1e-6, kSmallestAlpha);
+    const Places at = places(model, long_run() ? 400 : 150, isotropic, isotropic ? 3 : 4, 1e-6, kSmallestAlpha);
     const std::vector<float> got = albedos(model, at);
     for (std::size_t n = 0; n < at.size(); ++n) {
       const Mean mean = mean_weight(model, at, n, weight);
@@ -182,10 +181,10 @@ void expect_the_hemispheres_mean(const Model& model) {
 
 // A furnace of reflectance 1: all light comes back, in the mean over samples.
 void expect_a_white_furnace(Model model) {
-  std::vector<float> weight(1 << 17);
+  std::vector<float> weight(1 << (long_run() ? 17 : 16));
   for (const Compensation compensation : {Compensation::turquin, Compensation::kelemen}) {
     model.compensation = compensation;
-    const Places at = places(model, 60, true, 90, 1e-6, kSmallestAlpha, 4);
+    const Places at = places(model, long_run() ? 60 : 30, true, 90, 1e-6, kSmallestAlpha, 4);
     for (std::size_t n = 0; n < at.size(); ++n) {
       const Mean mean = mean_weight(model, at, n, weight);
       EXPECT_NEAR(mean.value, 1, (at.alpha_x[n] <= 1 ? 0.005 : 0.02) + 5 * mean.deviation)

@@ -347,6 +347,8 @@ std::vector<Point> calm_points(const Composition& c) {
   };
   std::vector<Point> points;
   for (const Calm& calm : kCalm) {
+    // An emulator takes one in front, one near the horizon and one behind.
+    if (kQuick && (&calm - kCalm) % 2 == 0) continue;
     Point p;
     set_incident(p, direction(calm.theta, calm.azimuth));
     p.alpha_x = calm.alpha_x;

@@ -44,7 +44,7 @@ TEST_P(ChiSquareTest, SamplesFollowTheDensity) {
   draw.alpha = roughness(configuration);
   draw.i = incident(configuration);
   draw.seed = 100 * static_cast<int>(c.sampler) + c.configuration + 1;
-  draw.count = kQuick ? 20'000 : long_run() ? 10'000'000 : 1'000'000;
+  draw.count = kQuick ? 20'000 : long_run() ? 10'000'000 : 400'000;
 
   const Verdict verdict = test_hypotheses(draw, {truth(draw)});
   const ChiSquare& test = verdict.tests[0];

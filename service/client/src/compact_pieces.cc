@@ -66,8 +66,7 @@ grpc::ByteBuffer CompactPieces::encode(std::size_t piece) {
   char* status = writer.column(v1::CompactRequest::kStatusFieldNumber, status_bytes);
   gather(compaction_.status, positions_, range, status);
   const std::size_t accepted = std::count(status, status + status_bytes, static_cast<char>(LaneStatus::accepted));
-  accepted_ += status_bytes == range.size() ? accepted : accepted * range.size();
-  first_[piece + 1] = accepted_;
+  first_[piece + 1] = first_[piece] + (status_bytes == range.size() ? accepted : accepted * range.size());
   for (const auto& column : compaction_.columns)
     gather(column.from, positions_, range,
            writer.column(v1::CompactRequest::kColumnsFieldNumber, values_sent(column.from, range) * sizeof(float)));

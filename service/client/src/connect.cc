@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <mutex>
 #include <set>
 
@@ -22,13 +23,15 @@ class RemoteEngine final : public Engine {
 
   absl::StatusOr<Statistics> run(Operation operation, const Batch& batch) override {
     if (auto status = check(operation, batch); !status.ok()) return status;
-    if (batch.model.table == nullptr) return send_pieces(operation, batch);
-    // A server may have lost a table: started again, or it was not used for long.
-    for (bool again = false;; again = true) {
-      if (auto status = upload(*batch.model.table, again); !status.ok()) return status;
-      auto statistics = send_pieces(operation, batch);
-      if (again || statistics.status().code() != absl::StatusCode::kNotFound) return statistics;
+    BatchPieces batch_pieces(operation, batch, limits_);
+    Pieces pieces = batch_pieces.pieces();
+    if (const SlopeTable* table = batch.model.table.get()) {
+      // A server that is not there gets it when it is; one that has lost it (started again, not used for long) says so.
+      pieces.provide = [this, table](const Channel& channel) { return upload(channel, *table); };
+      if (auto status = upload_to_all(*table); !status.ok()) return status;
     }
+    if (auto status = send(connections_, options_, pieces); !status.ok()) return status;
+    return batch_pieces.statistics();
   }
 
   absl::StatusOr<std::size_t> compact(const Compaction& compaction) override {
@@ -50,20 +53,17 @@ class RemoteEngine final : public Engine {
   }
 
  private:
-  absl::StatusOr<Statistics> send_pieces(Operation operation, const Batch& batch) {
-    BatchPieces batch_pieces(operation, batch, limits_);
-    const Pieces pieces = batch_pieces.pieces();
-    if (auto status = send(connections_, options_, pieces); !status.ok()) return status;
-    return batch_pieces.statistics();
-  }
-  // To the servers that have not got it from here, or to all.
-  absl::Status upload(const SlopeTable& table, bool to_all) {
-    const std::lock_guard lock(uploaded_mutex_);
-    if (!to_all && uploaded_.contains(table.id())) return absl::OkStatus();
+  absl::Status upload(const Channel& channel, const SlopeTable& table) const {
     const std::size_t piece = std::min(limits_.piece_bytes, limits_.message_bytes / 2);
+    return upload_table(channel, table, piece, std::chrono::system_clock::now() + options_.call_timeout);
+  }
+  // Once, so that not each server's first piece fails.
+  absl::Status upload_to_all(const SlopeTable& table) {
+    const std::lock_guard lock(uploaded_mutex_);
+    if (uploaded_.contains(table.id())) return absl::OkStatus();
     for (const auto& [channel, stub] : connections_)
-      if (auto status = upload_table(channel, table, piece, std::chrono::system_clock::now() + options_.call_timeout);
-          !status.ok())
+      if (auto status = upload(channel, table);
+          !status.ok() && !absl::IsUnavailable(status) && !absl::IsDeadlineExceeded(status))
         return status;
     uploaded_.insert(table.id());
     return absl::OkStatus();
@@ -97,18 +97,38 @@ absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> add
     auto stub = std::make_unique<grpc::GenericStub>(channel->channel);
     connections.push_back({*std::move(channel), std::move(stub)});
   }
+  // Each is asked once its connection stands. When one has answered, the others get kMore: they may come later.
+  constexpr std::chrono::milliseconds kMore{500};
   std::size_t message_bytes = std::size_t{1} << 30;
-  const auto until = std::chrono::system_clock::now() + options.connect_timeout;
-  for (const auto& [channel, stub] : connections) {
-    v1::InfoResponse info;
-    const grpc::Status status = ask_info(channel, until, true, info);
-    if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
-      return absl::UnavailableError(absl::StrCat("server ", channel.address, ": no answer within ",
-                                                 options.connect_timeout.count(), " ms: is it started?",
-                                                 reason(channel)));
-    if (!status.ok()) return wire::from_grpc(status, channel.address);
-    message_bytes = std::min<std::size_t>(message_bytes, info.max_message_bytes());
+  auto until = std::chrono::system_clock::now() + options.connect_timeout;
+  std::vector<const Channel*> silent;
+  for (const Connection& connection : connections) silent.push_back(&connection.channel);
+  for (bool last_look = false; !silent.empty() && !last_look;) {
+    last_look = std::chrono::system_clock::now() >= until;
+    for (std::size_t k = 0; k < silent.size();) {
+      const Channel& channel = *silent[k];
+      v1::InfoResponse info;
+      grpc::Status status(grpc::StatusCode::UNAVAILABLE, "");
+      if (channel.channel->GetState(true) == GRPC_CHANNEL_READY) status = ask_info(channel, until, false, info);
+      if (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+          status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED ||
+          status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
+        ++k;
+        continue;
+      }
+      if (!status.ok()) return wire::from_grpc(status, channel.address);
+      message_bytes = std::min<std::size_t>(message_bytes, info.max_message_bytes());
+      silent.erase(silent.begin() + static_cast<std::ptrdiff_t>(k));
+      until = std::min(until, std::chrono::system_clock::now() + kMore);
+    }
+    if (!silent.empty() && !last_look) wait_a_moment(*silent[0]->channel);
   }
+  if (silent.size() == connections.size())
+    return absl::UnavailableError(absl::StrCat("server ", silent[0]->address, ": no answer within ",
+                                               options.connect_timeout.count(), " ms: is it started?",
+                                               reason(*silent[0])));
+  for (const Channel* channel : silent)
+    if (options.absent) options.absent(absl::StrCat("server ", channel->address, ": no answer yet", reason(*channel)));
   if (message_bytes < 4096)
     return absl::FailedPreconditionError(absl::StrCat("a server takes messages of ", message_bytes, " bytes only"));
   return std::make_unique<RemoteEngine>(std::move(connections), options, message_bytes);

@@ -83,7 +83,7 @@ class CompactPieces {
  public:
   CompactPieces(const Compaction& compaction, const PieceLimits& limits);
   Pieces pieces();
-  std::size_t accepted() const { return accepted_; }
+  std::size_t accepted() const { return first_.back(); }
 
  private:
   grpc::ByteBuffer encode(std::size_t piece);
@@ -92,7 +92,6 @@ class CompactPieces {
   const Compaction& compaction_;
   Positions positions_;
   Split split_;
-  std::size_t accepted_ = 0;
   // Of each piece: accepted lanes before it. Known when it is sent, since the status column is here.
   std::vector<std::size_t> first_;
 };

@@ -1,7 +1,11 @@
 #include "src/pipeline.h"
 
 #include <algorithm>
+#include <deque>
 #include <optional>
+#include <thread>
+#include <tuple>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "wire/status.h"
@@ -9,15 +13,36 @@
 namespace facetwise {
 namespace {
 
+// Of each server in one call: one that forgets again and again has too little room.
+constexpr std::size_t kProvisions = 8;
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
 struct Call {
   std::optional<grpc::ClientContext> context;
   std::unique_ptr<grpc::ClientAsyncResponseReader<grpc::ByteBuffer>> reader;
+  // Kept for another attempt: outputs may lie where the inputs were.
+  grpc::ByteBuffer request;
   grpc::ByteBuffer response;
   grpc::Status status;
   std::size_t piece = 0;
   std::size_t connection = 0;
   bool in_flight = false;
 };
+
+// Nothing: another attempt would get the same answer. Else after how long one is worth it, at this server.
+std::optional<milliseconds> rest_after(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::UNAVAILABLE:        // not there, or shutting down
+    case grpc::StatusCode::DEADLINE_EXCEEDED:  // there, but does not answer
+    case grpc::StatusCode::CANCELLED:          // it wanted the place: the call's own cancelling ends the batch
+      return wire::retry_delay(status).value_or(milliseconds(100));
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:  // without a delay: a message above gRPC's limit
+      return wire::retry_delay(status);
+    default: return std::nullopt;
+  }
+}
 
 class Sender {
  public:
@@ -26,25 +51,26 @@ class Sender {
         options_(options),
         pieces_(pieces),
         calls_(std::min<std::size_t>(std::max(options.window, 1), pieces.count)),
-        load_(connections.size()) {}
+        servers_(connections.size()) {}
 
   absl::Status run() {
-    if (auto status = wait_for_connections(); !status.ok()) return status;
-    for (Call& call : calls_) start(call);
     absl::Status error;
-    while (in_flight_ > 0) {
+    while (error.ok() && (in_flight_ > 0 || next_ < pieces_.count || !again_.empty())) {
+      const bool waits = start_calls();
+      if (in_flight_ == 0) {  // for a server
+        if (error = given_up(); !error.ok()) break;
+        wait_a_moment(*connections_[turn_].channel.channel);
+        continue;
+      }
+      // While a server is waited for, so that its pieces are not kept for the others' next answers.
+      const auto until = std::chrono::system_clock::now() + (waits ? milliseconds(20) : std::chrono::hours(24));
       void* tag = nullptr;
       bool good = false;
-      queue_.Next(&tag, &good);
-      Call& call = *static_cast<Call*>(tag);
-      absl::Status status = finish(call);
-      if (error.ok() && !status.ok()) {
-        error = std::move(status);
-        for (Call& other : calls_)
-          if (other.in_flight) other.context->TryCancel();
-      }
-      if (error.ok() && next_ < pieces_.count) start(call);
+      if (queue_.AsyncNext(&tag, &good, until) == grpc::CompletionQueue::GOT_EVENT)
+        error = finish(*static_cast<Call*>(tag));
     }
+    for (Call& call : calls_)
+      if (call.in_flight) call.context->TryCancel();
     queue_.Shutdown();
     void* tag = nullptr;
     bool good = false;
@@ -54,52 +80,94 @@ class Sender {
   }
 
  private:
-  // Calls on a connection that was lost would fail before it is made again.
-  absl::Status wait_for_connections() const {
-    const auto until = std::chrono::system_clock::now() + options_.connect_timeout;
-    for (const auto& [connection, stub] : connections_) {
-      if (connection.channel->GetState(true) == GRPC_CHANNEL_READY || connection.channel->WaitForConnected(until))
-        continue;
-      return absl::UnavailableError(absl::StrCat("server ", connection.address, ": no connection within ",
-                                                 options_.connect_timeout.count(), " ms: has it ended?"));
+  struct Server {
+    int load = 0;  // calls in flight
+    Clock::time_point rests_until{};
+  };
+
+  // Gives every free call a piece, as far as there are servers. True: there are not enough.
+  bool start_calls() {
+    for (Call& call : calls_) {
+      if (call.in_flight || (again_.empty() && next_ == pieces_.count)) continue;
+      const auto server = pick_server();
+      if (!server) return true;
+      start(call, *server);
     }
-    return absl::OkStatus();
+    return false;
   }
 
-  // The connection with the fewest calls in flight, in turn among those.
-  std::size_t pick_connection() {
-    std::size_t best = turn_;
-    for (std::size_t k = 0; k < load_.size(); ++k)
-      if (const std::size_t other = (turn_ + k) % load_.size(); load_[other] < load_[best]) best = other;
-    turn_ = (best + 1) % load_.size();
+  // Of those that are there the one with the fewest calls in flight, in turn among those; none may be.
+  std::optional<std::size_t> pick_server() {
+    std::optional<std::size_t> best;
+    const auto now = Clock::now();
+    for (std::size_t k = 0; k < servers_.size(); ++k) {
+      const std::size_t other = (turn_ + k) % servers_.size();
+      if (servers_[other].rests_until > now) continue;
+      if (connections_[other].channel.channel->GetState(true) != GRPC_CHANNEL_READY) continue;
+      if (!best || servers_[other].load < servers_[*best].load) best = other;
+    }
+    if (best) turn_ = (*best + 1) % servers_.size();
     return best;
   }
 
-  void start(Call& call) {
-    call.piece = next_++;
-    call.connection = pick_connection();
-    ++load_[call.connection];
+  // An error when no server was there, or all refused, for as long as one is waited for.
+  absl::Status given_up() {
+    const auto now = Clock::now();
+    if (!failing_since_) failing_since_ = now;
+    if (now - *failing_since_ < options_.connect_timeout) return absl::OkStatus();
+    if (!last_error_.ok()) return last_error_;
+    return absl::UnavailableError(absl::StrCat("server ", connections_[0].channel.address, ": no connection within ",
+                                               options_.connect_timeout.count(), " ms: has it ended?"));
+  }
+
+  void start(Call& call, std::size_t server) {
+    if (again_.empty()) {
+      call.piece = next_++;
+      call.request = pieces_.encode(call.piece);
+    } else {
+      std::tie(call.piece, call.request) = again_.front();
+      again_.pop_front();
+    }
+    call.connection = server;
+    ++servers_[server].load;
+    const auto& [channel, stub] = connections_[server];
     call.context.emplace();
     call.context->set_deadline(std::chrono::system_clock::now() + options_.call_timeout);
-    connections_[call.connection].channel.authorise(*call.context);
+    channel.authorise(*call.context);
     call.response.Clear();
     call.in_flight = true;
     ++in_flight_;
-    call.reader = connections_[call.connection].stub->PrepareUnaryCall(&*call.context, pieces_.method,
-                                                                       pieces_.encode(call.piece), &queue_);
+    call.reader = stub->PrepareUnaryCall(&*call.context, pieces_.method, call.request, &queue_);
     call.reader->StartCall();
     call.reader->Finish(&call.response, &call.status, &call);
   }
 
+  // OK: the piece is done, or will be sent again. Since an answer depends on its request alone, it does not matter whether
+  // the server has computed it before.
   absl::Status finish(Call& call) {
     call.in_flight = false;
     --in_flight_;
-    --load_[call.connection];
+    Server& server = servers_[call.connection];
+    --server.load;
     const std::string& address = connections_[call.connection].channel.address;
-    if (!call.status.ok()) return wire::from_grpc(call.status, address);
-    const absl::Status status = pieces_.decode(call.piece, call.response);
-    if (status.ok()) return status;
-    return absl::Status(status.code(), absl::StrCat("server ", address, ": ", status.message()));
+    if (call.status.ok()) {
+      failing_since_.reset();
+      const absl::Status status = pieces_.decode(call.piece, call.response);
+      return status.ok() ? status
+                         : absl::Status(status.code(), absl::StrCat("server ", address, ": ", status.message()));
+    }
+    last_error_ = wire::from_grpc(call.status, address);
+    if (call.status.error_code() == grpc::StatusCode::NOT_FOUND && pieces_.provide &&
+        provided_ < kProvisions * connections_.size()) {
+      ++provided_;
+      if (auto status = pieces_.provide(connections_[call.connection].channel); !status.ok()) return status;
+    } else {
+      const auto rest = rest_after(call.status);
+      if (!rest) return last_error_;
+      server.rests_until = Clock::now() + *rest;
+    }
+    again_.emplace_back(call.piece, call.request);
+    return in_flight_ == 0 ? given_up() : absl::OkStatus();
   }
 
   const std::vector<Connection>& connections_;
@@ -107,13 +175,26 @@ class Sender {
   const Pieces& pieces_;
   grpc::CompletionQueue queue_;
   std::vector<Call> calls_;
-  std::vector<int> load_;  // calls in flight on each connection
+  std::vector<Server> servers_;  // of each connection
   std::size_t turn_ = 0;
-  std::size_t next_ = 0;
+  std::size_t next_ = 0;                                        // piece that has not been sent
+  std::deque<std::pair<std::size_t, grpc::ByteBuffer>> again_;  // pieces that failed, and their requests
   std::size_t in_flight_ = 0;
+  std::size_t provided_ = 0;
+  absl::Status last_error_;
+  std::optional<Clock::time_point> failing_since_;  // without an answer in between
 };
 
 }  // namespace
+
+void wait_a_moment(grpc::Channel& channel) {
+  const auto state = channel.GetState(true);
+  const auto until = std::chrono::system_clock::now() + milliseconds(5);
+  if (state == GRPC_CHANNEL_READY)
+    std::this_thread::sleep_until(until);
+  else
+    channel.WaitForStateChange(state, until);
+}
 
 absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces) {
   return Sender(connections, options, pieces).run();

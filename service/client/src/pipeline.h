@@ -25,10 +25,16 @@ struct Pieces {
   std::size_t count = 0;
   std::function<grpc::ByteBuffer(std::size_t piece)> encode;
   std::function<absl::Status(std::size_t piece, grpc::ByteBuffer& response)> decode;
+  // Gives a server what it says that it has not found; the piece is sent again. May be empty.
+  std::function<absl::Status(const Channel& channel)> provide = {};
 };
 
-// Sends the pieces, at most options.window at a time, and takes the responses as they come. The first error
-// ends it: calls in flight are cancelled and waited for.
+// Some milliseconds, in which connections get further: gRPC makes them only while somebody waits for one.
+void wait_a_moment(grpc::Channel& channel);
+
+// Sends the pieces, at most options.window at a time, to the servers that are there, and takes the responses as they come. A
+// piece whose server is lost, busy or silent is sent again, to another or later, as long as some server answers, or did
+// within options.connect_timeout. Any other error ends it: calls in flight are cancelled and waited for.
 absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces);
 
 }  // namespace facetwise

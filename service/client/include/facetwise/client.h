@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -19,7 +20,7 @@ struct ConnectOptions {
   std::size_t piece_bytes = std::size_t{1} << 20;
   // Pieces in flight at once, over all servers.
   int window = 4;
-  // How long connect(), or a call that has lost its server, waits for it (to come back).
+  // How long connect() waits for a server, and a call for one to come back, when none answers.
   std::chrono::milliseconds connect_timeout{5000};
   // How long a piece waits for its answer.
   std::chrono::milliseconds call_timeout{60000};
@@ -30,16 +31,19 @@ struct ConnectOptions {
   // A file whose first line is the token that the server asks for (server.h). Refused where it would cross a network
   // without TLS.
   std::string token_file{};
+  // Called by connect() for each server that does not answer while another does, with what may be printed: which, and why.
+  std::function<void(const std::string& message)> absent{};
 };
 
-// Connects to servers; each address is "unix:PATH" or "HOST:PORT". Pieces of a batch go to them in turn;
-// since every server gives the same bits, it does not matter which answers. Unavailable if one does not
-// answer in time, or its certificate is not trusted; Unauthenticated if it refuses the token.
+// Connects to servers; each address is "unix:PATH" or "HOST:PORT". Pieces of a batch go to those that are there, in turn;
+// since every server gives the same bits, it does not matter which answers. A piece whose server is lost, busy or silent is
+// sent again, to another or later; a server that was absent, or comes back, is used when it is there. Unavailable if none
+// answers in time, or a certificate is not trusted; Unauthenticated if one refuses the token.
 //
 // The engine's calls return what the local engine's do. A malformed call gets the same error, from checks
-// made here, before anything is sent or written. A call also fails when a server does: the error begins with
-// "server ADDRESS:", and outputs of pieces that were answered before it are written. Several threads may use
-// one engine. A program that moves much data should call tune_malloc() at its start.
+// made here, before anything is sent or written. A call also fails when no server answers for connect_timeout, or one says
+// that it never will: the error begins with "server ADDRESS:", and outputs of pieces that were answered before it are
+// written. Several threads may use one engine. A program that moves much data should call tune_malloc() at its start.
 absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> addresses,
                                                 const ConnectOptions& options = {});
 
