@@ -5,6 +5,7 @@
 
 #include "calls.h"
 #include "facetwise/engine.h"
+#include "facetwise/v1/error_details.pb.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "server_process.h"
@@ -67,10 +68,26 @@ class MalformedCall : public ::testing::Test {
     ASSERT_EQ(response.status().size(), kLanes);
   }
 
+  // The field is in the details too, as a google.rpc.BadRequest.
+  void expect_field(const grpc::Status& status) {
+    v1::ErrorStatus details;
+    v1::BadRequest request;
+    ASSERT_TRUE(details.ParseFromString(status.error_details()));
+    EXPECT_EQ(details.code(), status.error_code());
+    EXPECT_EQ(details.message(), status.error_message());
+    ASSERT_EQ(details.details_size(), 1);
+    EXPECT_EQ(details.details(0).type_url(), "type.googleapis.com/google.rpc.BadRequest");
+    ASSERT_TRUE(request.ParseFromString(details.details(0).value()));
+    ASSERT_EQ(request.field_violations_size(), 1);
+    const auto& violation = request.field_violations(0);
+    EXPECT_EQ(violation.field() + ": " + violation.description(), status.error_message());
+  }
+
   void expect_error(const grpc::Status& status, StatusCode code, const std::string& message) {
     EXPECT_EQ(status.error_code(), code) << status.error_message();
     EXPECT_TRUE(status.error_message().starts_with(message))
         << "got \"" << status.error_message() << "\", expected \"" << message << "...\"";
+    if (code == StatusCode::INVALID_ARGUMENT) expect_field(status);
     expect_alive();
   }
 
