@@ -92,6 +92,8 @@ Examples:
              "Calls worked on at once; beyond, they get RESOURCE_EXHAUSTED; default 128");
   add_number("--max-open-calls", options.max_open_calls, 1, 1 << 20,
              "Calls at once with those that wait for their client; default 1024");
+  add_number("--max-connections", options.max_connections, 1, 1 << 20,
+             "Connections at once; further ones wait; default 4096, less where fewer files may be open");
   add_number("--read-seconds", arguments->read_seconds, 1, 86400, "Longest wait for a call's message; default 20");
   add_number("--stream-idle-seconds", arguments->stream_idle_seconds, 1, 86400,
              "Longest wait for a stream's next message; default 300");

@@ -308,6 +308,32 @@ TEST_F(HostileClients, ThatAreIdleCostNoThread) {
   EXPECT_TRUE(run(1000).ok());
 }
 
+// More connections than there may be, by the server's limit or the system's: the rest wait, and come when there is room.
+TEST_F(HostileClients, ThatConnectTooOftenWait) {
+  for (const auto& limit : {std::vector<std::string>{"--files", "64"}, {"--max-connections", "20"}}) {
+    SCOPED_TRACE(limit[0]);
+    std::vector<std::string> arguments = {"--listen", address(), "--listen", "127.0.0.1:0"};
+    arguments.insert(arguments.end(), limit.begin(), limit.end());
+    ServerProcess server(arguments);
+    ASSERT_TRUE(server.ready());
+    EXPECT_TRUE(run(3).ok());
+    std::vector<int> connections;
+    for (int k = 0; k < 100; ++k) {
+      connections.push_back(connect_to(path()));
+      ASSERT_GE(connections.back(), 0);
+    }
+    EXPECT_EQ(run(3, std::chrono::seconds(1)).error_code(), StatusCode::DEADLINE_EXCEEDED);
+    for (const int connection : connections) close(connection);
+    EXPECT_TRUE(run(3).ok());
+    grpc::ClientContext context;
+    v1::BatchResponse response;
+    const auto stub = v1::Sampler::NewStub(open_channel(server.addresses()[1]));
+    EXPECT_TRUE(stub->Run(&context, good_request(3), &response).ok());
+    server.signal(SIGTERM);
+    EXPECT_EQ(server.wait(), 0);
+  }
+}
+
 // Reflection is gRPC's own and has a thread per stream: only so many, and calls and health do not need them.
 TEST_F(HostileClients, ThatReflectForEverAreLimited) {
   ServerProcess server({"--listen", address(), "--max-calls", "8"});

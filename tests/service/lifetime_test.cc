@@ -371,6 +371,23 @@ TEST_F(Lifetime, DrainsUnderLoad) {
   }
 }
 
+// Between saying so and refusing there is a pause.
+TEST_F(Lifetime, CallsAreTakenUntilTheWatchersKnow) {
+  ServerProcess server({"--listen", unix_address(), "--pause-ms", "1500"});
+  ASSERT_TRUE(server.ready());
+  Health::Watch watch(open_channel(unix_address()), "facetwise.v1.Sampler");
+  ASSERT_EQ(watch.next(), Health::serving);
+  const auto stub = stub_of(unix_address());
+  ASSERT_TRUE(run(*stub, 3).ok());
+  server.signal(SIGTERM);
+  EXPECT_EQ(watch.next(), Health::not_serving);
+  EXPECT_TRUE(run(*stub, 3).ok());
+  grpc::Status status;
+  while ((status = run(*stub, 3)).ok()) usleep(10000);
+  EXPECT_EQ(status.error_code(), StatusCode::UNAVAILABLE);
+  EXPECT_EQ(server.wait(), 0);
+}
+
 // A call that computes when the signal comes is answered.
 TEST_F(Lifetime, FinishesCallsInFlight) {
   ServerProcess server({"--listen", unix_address(), "--allow-benchmark"});

@@ -1,5 +1,7 @@
 // A server process for the tests: the library's serve() with its limits as flags. Prints each address that it
 // listens on, then "ready". Its Benchmark call answers with made-up results, slowly, so that tests can watch.
+#include <sys/resource.h>
+
 #include <chrono>
 #include <cstdio>
 #include <thread>
@@ -28,15 +30,19 @@ absl::Status report_steps(const facetwise::v1::BenchmarkRequest& request, const 
 
 int main(int argc, char** argv) {
   facetwise::ServerOptions options;
-  long drain_ms = 10000;
+  long drain_ms = 10000, pause_ms = 20;
   CLI::App app("facetwise server for tests");
   app.add_option("--listen", options.listen)->required();
   app.add_option("--threads", options.threads);
   app.add_option("--max-message-bytes", options.max_message_bytes);
+  rlim_t files = 0;
+  app.add_option("--files", files, "limit of open files");
+  app.add_option("--max-connections", options.max_connections);
   app.add_option("--max-calls", options.max_calls);
   app.add_option("--max-open-calls", options.max_open_calls);
   app.add_option("--max-bytes-in-flight", options.max_bytes_in_flight);
   app.add_option("--drain-ms", drain_ms);
+  app.add_option("--pause-ms", pause_ms);
   long read_ms = 20000, idle_ms = 300000, write_ms = 60000, patience_ms = 2000;
   app.add_option("--read-ms", read_ms);
   app.add_option("--idle-ms", idle_ms);
@@ -53,6 +59,8 @@ int main(int argc, char** argv) {
   app.add_option("--token-file", options.token_file);
   app.add_flag("--allow-benchmark", options.allow_benchmark);
   CLI11_PARSE(app, argc, argv);
+  if (const rlimit limit{files, files}; files > 0) setrlimit(RLIMIT_NOFILE, &limit);
+  options.drain_pause = std::chrono::milliseconds(pause_ms);
   options.drain_timeout = std::chrono::milliseconds(drain_ms);
   options.read_timeout = std::chrono::milliseconds(read_ms);
   options.write_timeout = std::chrono::milliseconds(write_ms);

@@ -1,7 +1,10 @@
 #include "src/listen.h"
 
 #include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
 #include <sys/file.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -10,6 +13,7 @@
 #include <cerrno>
 #include <cstring>
 #include <iterator>
+#include <memory>
 #include <string_view>
 #include <utility>
 
@@ -20,6 +24,7 @@ namespace facetwise {
 namespace {
 
 constexpr const char* kUnix = "unix:";
+constexpr int kFlags = SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, kBacklog = 1024;
 
 absl::Status system_error(const std::string& path, const char* what) {
   return absl::UnavailableError(absl::StrCat("unix:", path, ": ", what, ": ", std::strerror(errno)));
@@ -69,8 +74,69 @@ absl::Status check_address(const std::string& address, bool anywhere) {
   return absl::OkStatus();
 }
 
-std::string with_port(const std::string& address, int port) {
-  return absl::StrCat(address.substr(0, address.rfind(':') + 1), port);
+Socket::~Socket() {
+  if (file_ >= 0) close(file_);
+}
+
+Socket::Socket(Socket&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+
+Socket& Socket::operator=(Socket&& other) noexcept {
+  std::swap(file_, other.file_);
+  return *this;
+}
+
+absl::StatusOr<Listening> listen_on(const std::string& address, unsigned unix_mode) {
+  const auto unavailable = [&](const char* why) {
+    return absl::UnavailableError(absl::StrCat(address, ": cannot listen there: ", why));
+  };
+  Listening listening{.sockets = {}, .address = address};
+  if (const std::string path = unix_path(address); !path.empty()) {
+    sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
+    std::strncpy(where.sun_path, path.c_str(), sizeof where.sun_path - 1);
+    Socket socket(::socket(AF_UNIX, kFlags, 0));
+    if (socket.file() < 0 || bind(socket.file(), reinterpret_cast<const sockaddr*>(&where), sizeof where) != 0 ||
+        chmod(path.c_str(), unix_mode) != 0 || listen(socket.file(), kBacklog) != 0)
+      return unavailable(std::strerror(errno));
+    listening.sockets.push_back(std::move(socket));
+    return listening;
+  }
+
+  const auto colon = address.rfind(':');
+  std::string host = address.substr(0, colon), port = address.substr(colon + 1);
+  if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
+  addrinfo wanted = {};
+  wanted.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  wanted.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (const int error = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found); error != 0)
+    return unavailable(gai_strerror(error));
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> list(found, freeaddrinfo);
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+    sockaddr_storage where = {};
+    std::memcpy(&where, one->ai_addr, one->ai_addrlen);
+    // Each of a host's addresses has the same port.
+    in_port_t& its_port = where.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(where).sin6_port
+                                                      : reinterpret_cast<sockaddr_in&>(where).sin_port;
+    its_port = htons(static_cast<in_port_t>(std::stoi(port)));
+    Socket socket(::socket(where.ss_family, kFlags, 0));
+    const int on = 1, off = 0;
+    setsockopt(socket.file(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (where.ss_family == AF_INET6) setsockopt(socket.file(), IPPROTO_IPV6, IPV6_V6ONLY, &off, sizeof off);
+    socklen_t size = one->ai_addrlen;
+    if (socket.file() < 0 || bind(socket.file(), reinterpret_cast<const sockaddr*>(&where), size) != 0 ||
+        listen(socket.file(), kBacklog) != 0 ||
+        getsockname(socket.file(), reinterpret_cast<sockaddr*>(&where), &size) != 0) {
+      // "localhost" names an IPv6 address where there may be none.
+      if (one->ai_next == nullptr && listening.sockets.empty()) return unavailable(std::strerror(errno));
+      if (errno == EADDRNOTAVAIL || errno == EAFNOSUPPORT) continue;
+      return unavailable(std::strerror(errno));
+    }
+    port = absl::StrCat(ntohs(its_port));
+    listening.sockets.push_back(std::move(socket));
+  }
+  if (listening.sockets.empty()) return unavailable("not an address of this machine");
+  listening.address = absl::StrCat(address.substr(0, colon + 1), port);
+  return listening;
 }
 
 SocketLock::~SocketLock() {

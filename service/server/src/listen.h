@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -29,7 +30,26 @@ class SocketLock {
 std::string unix_path(const std::string& address);
 // OK if `address` is "unix:PATH" or "HOST:PORT", the host being this machine's loopback unless `anywhere`.
 absl::Status check_address(const std::string& address, bool anywhere);
-// "HOST:PORT" with another port.
-std::string with_port(const std::string& address, int port);
+
+// A file descriptor that is closed with it.
+class Socket {
+ public:
+  explicit Socket(int file = -1) : file_(file) {}
+  ~Socket();
+  Socket(Socket&& other) noexcept;
+  Socket& operator=(Socket&& other) noexcept;
+  int file() const { return file_; }
+
+ private:
+  int file_;
+};
+
+// What listens on an address: a host may have several. Unavailable, naming the address, where that cannot be.
+struct Listening {
+  std::vector<Socket> sockets;
+  std::string address;  // with the port that was taken, where it said 0
+};
+// A Unix socket gets `unix_mode`, before anybody can connect; its SocketLock must be held.
+absl::StatusOr<Listening> listen_on(const std::string& address, unsigned unix_mode);
 
 }  // namespace facetwise

@@ -59,7 +59,7 @@ class Signals {
 
 absl::Status serve(const ServerOptions& options, const std::function<void(const Server&)>& ready) {
   tune_malloc();
-  // As many connections as the system allows: at the limit gRPC's listener stops for good.
+  // As many connections as the system allows.
   if (rlimit files; getrlimit(RLIMIT_NOFILE, &files) == 0 && files.rlim_cur < files.rlim_max) {
     files.rlim_cur = files.rlim_max;
     setrlimit(RLIMIT_NOFILE, &files);

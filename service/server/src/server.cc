@@ -1,11 +1,8 @@
 #include "facetwise/server.h"
 
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +10,7 @@
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/resource_quota.h"
+#include "src/acceptor.h"
 #include "src/listen.h"
 #include "src/sampler_service.h"
 #include "src/tls.h"
@@ -22,6 +20,8 @@ namespace facetwise {
 namespace {
 
 constexpr std::chrono::milliseconds kPause{100};
+// A connection without calls; clients make another when they need it.
+constexpr std::chrono::milliseconds kIdleConnection = std::chrono::minutes(10);
 constexpr int kReflectionThreads = 16;
 // Calls that are not ours (a health watch, a reflection stream) have this long when ours are done.
 constexpr std::chrono::milliseconds kLinger{300};
@@ -38,6 +38,7 @@ absl::Status check_options(const ServerOptions& options) {
   if (options.max_message_bytes < 4096 || options.max_message_bytes > std::size_t{1} << 30)
     return invalid("max_message_bytes: not from 4 KiB to 1 GiB");
   if (options.max_calls < 1) return invalid("max_calls: below 1");
+  if (options.max_connections < 1) return invalid("max_connections: below 1");
   if (options.max_open_calls < 1) return invalid("max_open_calls: below 1");
   if (options.max_bytes_in_flight / (Admission::kMessagesHeld + 1) < options.max_message_bytes)
     return invalid(
@@ -69,7 +70,8 @@ class GrpcServer final : public Server {
   std::vector<std::string> addresses_;
   std::mutex drain_mutex_;
   bool drained_ = false;
-  std::unique_ptr<grpc::Server> server_;  // goes first
+  std::unique_ptr<grpc::Server> server_;
+  std::optional<Acceptor> acceptor_;  // goes first
 };
 
 absl::Status GrpcServer::listen() {
@@ -87,10 +89,9 @@ absl::Status GrpcServer::listen() {
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 30000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, static_cast<int>(kIdleConnection.count()));
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5000);
   builder.SetMaxSendMessageSize(-1);  // answer_batch() keeps responses below the limit
-  // Two servers on one port would share its connections without a word.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   // One client leaves places for others; what it asks for beyond waits in its own gRPC.
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, std::max(options_.max_open_calls / 4, 16));
   // What comes before it was asked for; estimating the bandwidth would raise it.
@@ -101,38 +102,27 @@ absl::Status GrpcServer::listen() {
   quota.SetMaxThreads(kReflectionThreads);
   builder.SetResourceQuota(quota);
 
-  const auto tls = credentials(options_);
-  std::vector<int> ports(options_.listen.size(), -1);
-  bool any_unix = false;
-  for (std::size_t k = 0; k < options_.listen.size(); ++k) {
-    const std::string& address = options_.listen[k];
-    if (const std::string path = unix_path(address); !path.empty()) {
-      any_unix = true;
+  using External = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
+  auto to_unix =
+      builder.experimental().AddExternalConnectionAcceptor(External::FROM_FD, grpc::InsecureServerCredentials());
+  auto to_tcp = builder.experimental().AddExternalConnectionAcceptor(External::FROM_FD, credentials(options_));
+  std::vector<Acceptor::Place> places;
+  for (const std::string& address : options_.listen) {
+    const std::string path = unix_path(address);
+    if (!path.empty()) {
       auto lock = SocketLock::take(path);
       if (!lock.ok()) return lock.status();
       sockets_.push_back(*std::move(lock));
     }
-    builder.AddListeningPort(address, unix_path(address).empty() ? tls : grpc::InsecureServerCredentials(), &ports[k]);
+    auto listening = listen_on(address, options_.unix_mode);
+    if (!listening.ok()) return listening.status();
+    addresses_.push_back(listening->address);
+    for (Socket& socket : listening->sockets)
+      places.push_back({std::move(socket), path.empty() ? to_tcp.get() : to_unix.get()});
   }
-
-  // Sockets are made for nobody else first, so that nobody slips in before they have their permissions.
-  const mode_t mask = any_unix ? umask(0177) : 0;
   server_ = builder.BuildAndStart();
-  if (any_unix) umask(mask);
-  for (std::size_t k = 0; k < ports.size(); ++k) {
-    const std::string& address = options_.listen[k];
-    if (ports[k] <= 0)
-      return absl::UnavailableError(
-          absl::StrCat(address, ": cannot listen there: in use, not allowed, or not an address of this machine"));
-  }
-  for (std::size_t k = 0; k < ports.size(); ++k) {
-    const std::string& address = options_.listen[k];
-    const std::string path = unix_path(address);
-    if (!path.empty() && chmod(path.c_str(), options_.unix_mode) != 0)
-      return absl::UnavailableError(absl::StrCat(address, ": cannot set its permissions: ", std::strerror(errno)));
-    addresses_.push_back(path.empty() ? with_port(address, ports[k]) : address);
-  }
   if (!server_) return absl::UnavailableError("listen: the server could not start");
+  acceptor_.emplace(std::move(places), std::move(to_unix), std::move(to_tcp), options_.max_connections);
   server_->GetHealthCheckService()->SetServingStatus("facetwise.v1.Sampler", true);
   return absl::OkStatus();
 }
@@ -143,6 +133,8 @@ void GrpcServer::drain() {
   drained_ = true;
   const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
   server_->GetHealthCheckService()->SetServingStatus(false);
+  // Those who watch the health go elsewhere meanwhile, instead of being refused.
+  std::this_thread::sleep_for(options_.drain_pause);
   service_.admission().close();
   // gRPC's own shutdown would drop calls whose requests are on their way, so until ours are done it goes on
   // and new calls are refused one by one. The pause is for those that have just arrived.
@@ -150,6 +142,7 @@ void GrpcServer::drain() {
   std::this_thread::sleep_for(kPause);
   service_.admission().wait_until_idle(until);
   const bool idle = service_.admission().calls() == 0;
+  acceptor_.reset();
   server_->Shutdown(std::chrono::system_clock::now() + (idle ? kLinger : std::chrono::milliseconds(0)));
   sockets_.clear();
 }

@@ -53,6 +53,8 @@ struct ServerOptions {
   // until there is room; the rest are for requests (as received, and as decoded) and answers, and a call that would go
   // above gets RESOURCE_EXHAUSTED. Five times max_message_bytes at least.
   std::size_t max_bytes_in_flight = std::size_t{1} << 30;
+  // Connections at once; further ones wait until one is closed. Never more than the process may have open files, less some.
+  int max_connections = 4096;
   // Tables of slopes that clients upload: largest of one, of all together, and how long one stays that nobody uses.
   std::size_t max_table_bytes = std::size_t{64} << 20, max_tables_bytes = std::size_t{256} << 20;
   std::chrono::milliseconds table_idle_timeout{3600000};
@@ -61,8 +63,9 @@ struct ServerOptions {
   std::chrono::milliseconds read_timeout{20000}, stream_idle_timeout{300000}, write_timeout{60000};
   // The same where another call has been refused, or waits, for want of room: those that wait longest for their client go.
   std::chrono::milliseconds patience{2000};
-  // How long drain() waits for calls in flight before it ends them.
-  std::chrono::milliseconds drain_timeout{10000};
+  // How long drain() takes calls after it has told that it will not, and how long, with that, it waits for calls in flight
+  // before it ends them.
+  std::chrono::milliseconds drain_pause{500}, drain_timeout{10000};
   // Which kernels run. Its thread setting is not used.
   Execution execution;
   // Benchmark calls are PERMISSION_DENIED unless allowed and a runner is given.
@@ -81,8 +84,8 @@ class Server {
   virtual std::span<const std::string> addresses() const = 0;
   // Returns when the server has drained.
   virtual void wait() = 0;
-  // Health says NOT_SERVING, no new calls are taken, those in flight finish (until drain_timeout, then they
-  // are cancelled). Returns when all is done. Any thread may call it, more than once.
+  // Health says NOT_SERVING; after drain_pause no new calls are taken, those in flight finish (until drain_timeout, then
+  // they are cancelled). Returns when all is done. Any thread may call it, more than once.
   virtual void drain() = 0;
 };
 

@@ -1,0 +1,85 @@
+#include "src/acceptor.h"
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <utility>
+
+namespace facetwise {
+namespace {
+
+// Open files that are none of the connections: sockets that listen, gRPC's own, certificates, tokens.
+constexpr std::size_t kOtherFiles = 40;
+// How often it is looked whether a connection has gone, where there was no room.
+constexpr int kLookMs = 50;
+
+std::size_t most_connections(int wanted) {
+  rlimit files;
+  if (getrlimit(RLIMIT_NOFILE, &files) != 0 || files.rlim_cur == RLIM_INFINITY) return wanted;
+  const std::size_t allowed = files.rlim_cur > kOtherFiles + 1 ? files.rlim_cur - kOtherFiles : 1;
+  return std::min<std::size_t>(wanted, allowed);
+}
+
+}  // namespace
+
+Acceptor::Acceptor(std::vector<Place> places, std::unique_ptr<ToGrpc> to_unix, std::unique_ptr<ToGrpc> to_tcp,
+                   int max_connections)
+    : places_(std::move(places)),
+      to_unix_(std::move(to_unix)),
+      to_tcp_(std::move(to_tcp)),
+      most_(most_connections(max_connections)),
+      ends_(eventfd(0, EFD_CLOEXEC)),
+      thread_([this] { accept_all(); }) {}
+
+Acceptor::~Acceptor() {
+  eventfd_write(ends_.file(), 1);
+  thread_.join();
+}
+
+void Acceptor::accept_all() {
+  std::vector<pollfd> sockets = {{ends_.file(), POLLIN, 0}};
+  for (const Place& place : places_) sockets.push_back({place.socket.file(), POLLIN, 0});
+  for (bool room = true;;) {
+    poll(sockets.data(), room ? sockets.size() : 1, room ? -1 : kLookMs);
+    if (sockets[0].revents != 0) return;
+    if (!room) {
+      room = has_room();
+      continue;
+    }
+    for (std::size_t k = 0; k < places_.size() && room; ++k)
+      if (sockets[k + 1].revents != 0) room = accept_one(places_[k]);
+  }
+}
+
+bool Acceptor::accept_one(const Place& place) {
+  if (!has_room()) return false;
+  const int file = accept4(place.socket.file(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (file < 0) return errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM;
+  const int on = 1;
+  setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  struct stat status;
+  if (fstat(file, &status) == 0) accepted_.push_back({file, status.st_ino});
+  ToGrpc::NewConnectionParameters connection;
+  connection.listener_fd = place.socket.file();
+  connection.fd = file;
+  place.to->HandleNewConnection(&connection);
+  return true;
+}
+
+bool Acceptor::has_room() {
+  if (accepted_.size() < most_) return true;
+  std::erase_if(accepted_, [](const Accepted& accepted) {
+    struct stat status;
+    return fstat(accepted.file, &status) != 0 || status.st_ino != accepted.inode;
+  });
+  return accepted_.size() < most_;
+}
+
+}  // namespace facetwise
