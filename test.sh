@@ -11,7 +11,8 @@ On a Debian 12 machine: installs the packages that are missing, builds the prese
 build/release) and `arm64` (the library, build/arm64), and runs all tests in one CTest run; those built
 for arm64 run under qemu-aarch64 and are named arm64.*.
 
-  --quick  only the native tests: nothing is built for arm64 or emulated
+  --quick  only the native tests, with fewer samples and without the experiments and the report's page: nothing is
+           built for arm64 or emulated
   --sanitize  instead, the engine's and the service's tests with smaller counts, built twice: with AddressSanitizer and
            UndefinedBehaviorSanitizer (build/sanitize), and with ThreadSanitizer (build/sanitize-threads)
   --long   also the tests that take long: the power of the chi-square test at 10^8 samples, and the like
@@ -71,5 +72,5 @@ echo "build (build/release)"
 logged configure-test cmake --preset test -D FACETWISE_TESTS_FROM="$emulated"
 logged build-test cmake --build build/release
 
-export FACETWISE_LONG=$long
-exec ctest --test-dir build/release --output-on-failure -j2
+export FACETWISE_LONG=$long FACETWISE_QUICK=$quick
+exec ctest --test-dir build/release --output-on-failure -j2 ${quick:+-LE "report|experiments"}

@@ -12,7 +12,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kLanes = kQuick ? 1200 : 9000;
+const std::size_t kLanes = kQuick ? 1200 : 9000;
 
 std::vector<Call> sampling_calls() {
   std::vector<Call> calls;

@@ -7,15 +7,12 @@
 #include <cmath>
 
 #include "support/call.h"
+#include "support/counts.h"
 
 namespace facetwise::test {
 namespace {
 
-#ifdef FACETWISE_QUICK
-constexpr std::size_t kLanes = 50'000;
-#else
-constexpr std::size_t kLanes = 1'000'000;
-#endif
+const std::size_t kLanes = kQuick ? 50'000 : 1'000'000;
 
 enum Input {
   kX = input::incident_x,

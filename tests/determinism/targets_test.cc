@@ -9,7 +9,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kLanes = kQuick ? 3000 : 30'000;
+const std::size_t kLanes = kQuick ? 3000 : 30'000;
 
 void expect_targets_agree(const Lanes& lanes) {
   for (const Call& call : all_calls()) {
@@ -35,7 +35,7 @@ TEST(Targets, LanesReachEveryStatus) {
                                 (call.operation == Operation::sample_reflection && call.sampler == Sampler::exact);
     for (const Kind kind : {Kind::mixed, Kind::any_bits}) {
       const Statistics statistics = compute(call, hard_lanes(kind, kLanes, 12)).statistics;
-      constexpr std::uint64_t kSome = kLanes / 200;
+      const std::uint64_t kSome = kLanes / 200;
       EXPECT_GT(statistics.accepted, kSome) << call_name(call);
       EXPECT_GT(statistics.smooth, 0u) << call_name(call);
       EXPECT_GT(statistics.invalid, kSome) << call_name(call);

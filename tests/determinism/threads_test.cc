@@ -12,7 +12,7 @@ namespace facetwise::test {
 namespace {
 
 // Many of the ranges that calls are cut into, and an odd rest.
-constexpr std::size_t kLanes = kQuick ? 9'011 : 100'003;
+const std::size_t kLanes = kQuick ? 9'011 : 100'003;
 
 TEST(Threads, AnyNumber) {
   const Lanes lanes = hard_lanes(Kind::mixed, kLanes, 61);

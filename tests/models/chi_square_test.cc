@@ -16,8 +16,8 @@ namespace {
 
 using reference::Vector;
 
-constexpr std::size_t kCount = kQuick ? 10'000 : 100'000;
-constexpr int kSide = kQuick ? 120 : 384;
+const std::size_t kCount = kQuick ? 10'000 : 100'000;
+const int kSide = kQuick ? 120 : 384;
 // Any case of this file fails a right kernel with this probability; the seeds are fixed.
 constexpr double kAnyFailure = 0.01;
 

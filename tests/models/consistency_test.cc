@@ -17,7 +17,7 @@ namespace {
 using reference::Vector;
 
 constexpr double kUnit = 0x1p-24;
-constexpr std::size_t kLanes = kQuick ? 128 : 2048;
+const std::size_t kLanes = kQuick ? 128 : 2048;
 
 class ModelConsistency : public testing::TestWithParam<Family> {};
 

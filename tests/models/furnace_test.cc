@@ -10,7 +10,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kCount = kQuick ? 5'000 : 100'000;
+const std::size_t kCount = kQuick ? 5'000 : 100'000;
 
 class ModelFurnace : public testing::TestWithParam<Family> {};
 

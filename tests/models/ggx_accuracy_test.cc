@@ -278,7 +278,7 @@ Roughness alpha_of(const Lane& lane) { return {lane[kAlphaX], lane[kAlphaY]}; }
 Vector i_of(const Lane& lane) { return {lane[kIx], lane[kIy], lane[kIz]}; }
 Vector o_of(const Lane& lane) { return {lane[kOx], lane[kOy], lane[kOz]}; }
 
-constexpr std::size_t kLanes = kQuick ? 20'000 : 10'000'000;
+const std::size_t kLanes = kQuick ? 20'000 : 10'000'000;
 
 class Accuracy : public testing::TestWithParam<Sampler> {};
 

@@ -39,7 +39,7 @@ double change(Sampler sampler, const Lane& lane, reference::Vector h) {
 class Consistency : public testing::TestWithParam<Sampler> {};
 
 TEST_P(Consistency, SampledPdfIsThePdf) {
-  constexpr std::size_t kLanes = kQuick ? 20'000 : 2'000'000;
+  const std::size_t kLanes = kQuick ? 20'000 : 2'000'000;
   constexpr double kUnit = 0x1p-24;
   const LaneColumns columns = make_lanes(kLanes, 5);
   std::vector<float> o[3], m[3], im(kLanes), pdf(kLanes), weight(kLanes), again(kLanes), value(kLanes);

@@ -13,8 +13,8 @@ namespace facetwise::test {
 namespace {
 
 TEST(Exact, IsNeverOccluded) {
-  constexpr int kConfigurations = kQuick ? 50 : 1000;
-  constexpr std::size_t kSamples = kQuick ? 2'000 : 100'000;
+  const int kConfigurations = kQuick ? 50 : 1000;
+  const std::size_t kSamples = kQuick ? 2'000 : 100'000;
   std::mt19937_64 engine(1);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::vector<float> oz(kSamples);

@@ -10,8 +10,8 @@
 namespace facetwise::test {
 namespace {
 
-constexpr int kSide = kQuick ? 96 : 320;
-constexpr std::size_t kCount = kQuick ? 10'000 : 200'000;
+const int kSide = kQuick ? 96 : 320;
+const std::size_t kCount = kQuick ? 10'000 : 200'000;
 
 class ModelIntegrals : public testing::TestWithParam<Family> {};
 

@@ -10,7 +10,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::size_t kLanes = kQuick ? 512 : 8192;
+const std::size_t kLanes = kQuick ? 512 : 8192;
 
 Composition without(Composition c) {
   c.model.retro = false;

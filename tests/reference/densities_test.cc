@@ -298,7 +298,7 @@ bool refract(double eta, Vector i, Vector m, double im, Vector& o) {
 
 // Sum over a grid of the sphere's half where o_z has the given sign, in o itself.
 double over_half_sphere(double sign, const std::function<double(Vector)>& f) {
-  constexpr int kHeights = kQuick ? 200 : 700, kAzimuths = kHeights;
+  const int kHeights = kQuick ? 200 : 700, kAzimuths = kHeights;
   double sum = 0;
   for (int n = 0; n < kHeights; ++n) {
     const double z = (n + 0.5) / kHeights, r = std::sqrt(1 - z * z);

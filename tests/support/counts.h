@@ -6,16 +6,19 @@
 
 namespace facetwise::test {
 
-#ifdef FACETWISE_QUICK
-inline constexpr bool kQuick = true;  // in an emulator, or under a sanitizer
-#else
-inline constexpr bool kQuick = false;
-#endif
-
-// FACETWISE_LONG=1 in the environment: the runs that take minutes.
-inline bool long_run() {
-  const char* value = std::getenv("FACETWISE_LONG");
+inline bool set_in_environment(const char* name) {
+  const char* value = std::getenv(name);
   return value != nullptr && !std::string_view(value).empty() && std::string_view(value) != "0";
 }
+
+// Few: in an emulator or under a sanitizer, and for ./test.sh --quick, which sets FACETWISE_QUICK=1.
+#ifdef FACETWISE_QUICK
+inline const bool kQuick = true;
+#else
+inline const bool kQuick = set_in_environment("FACETWISE_QUICK");
+#endif
+
+// FACETWISE_LONG=1: the runs that take minutes.
+inline bool long_run() { return set_in_environment("FACETWISE_LONG"); }
 
 }  // namespace facetwise::test

@@ -36,7 +36,7 @@ struct Cells {
 };
 
 Cells make_cells(const Hypothesis& hypothesis, std::uint64_t count) {
-  constexpr int kAcross = kQuick ? 10 : 32;
+  const int kAcross = kQuick ? 10 : 32;
   Cells cells;
   cells.grid = make_grid(hypothesis.lobe, hypothesis.density, kAcross, kAcross);
   const double n = static_cast<double>(count);

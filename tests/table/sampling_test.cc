@@ -13,7 +13,7 @@
 namespace facetwise::test {
 namespace {
 
-constexpr std::uint64_t kSamples = kQuick ? 20'000 : 200'000;
+const std::uint64_t kSamples = kQuick ? 20'000 : 200'000;
 
 std::vector<std::uint64_t> counts(const SlopeTable& table, double theta, double phi, const Cells& cells) {
   std::vector<std::uint64_t> counts(static_cast<std::size_t>(cells.count()));

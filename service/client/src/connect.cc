@@ -76,7 +76,7 @@ class RemoteEngine final : public Engine {
   std::set<std::uint64_t> uploaded_;  // by SlopeTable::id()
 };
 
-// Why a server does not answer that was not waited for: gRPC tells only then.
+// Why a server does not answer. gRPC says it only to a call that does not wait for the connection.
 std::string reason(const Channel& channel) {
   v1::InfoResponse info;
   const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(500);

@@ -13,7 +13,7 @@
 namespace facetwise {
 namespace {
 
-// Of each server in one call: one that forgets again and again has too little room.
+// How often, per server, a table is given again in one call: a server that keeps losing it has too little room.
 constexpr std::size_t kProvisions = 8;
 
 using Clock = std::chrono::steady_clock;
@@ -31,7 +31,7 @@ struct Call {
   bool in_flight = false;
 };
 
-// Nothing: another attempt would get the same answer. Else after how long one is worth it, at this server.
+// How long to wait before this server is asked again. Nothing: it would give the same answer.
 std::optional<milliseconds> rest_after(const grpc::Status& status) {
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:        // not there, or shutting down
@@ -62,7 +62,7 @@ class Sender {
         wait_a_moment(*connections_[turn_].channel.channel);
         continue;
       }
-      // While a server is waited for, so that its pieces are not kept for the others' next answers.
+      // Where pieces wait for a server, it is looked for often: not only when the next answer comes.
       const auto until = std::chrono::system_clock::now() + (waits ? milliseconds(20) : std::chrono::hours(24));
       void* tag = nullptr;
       bool good = false;
@@ -96,7 +96,7 @@ class Sender {
     return false;
   }
 
-  // Of those that are there the one with the fewest calls in flight, in turn among those; none may be.
+  // The server with the fewest calls in flight, taking turns between equals. Nothing: none can be used now.
   std::optional<std::size_t> pick_server() {
     std::optional<std::size_t> best;
     const auto now = Clock::now();

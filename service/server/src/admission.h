@@ -40,7 +40,7 @@ class Admission {
   // A call, from its first moment until its last byte has left.
   class Stay {
    public:
-    // `cancel` ends the call, from any thread. Calls of the same `peer` (empty: of none) share what one may have.
+    // `cancel` ends the call, from any thread. Calls with the same `peer` share the room of one client, unless it is empty.
     Stay(Admission& admission, std::function<void()> cancel, std::string peer)
         : admission_(admission), cancel_(std::move(cancel)), peer_(std::move(peer)) {}
     ~Stay();

@@ -5,7 +5,8 @@
 namespace facetwise {
 namespace {
 
-// Who shares what one client may have. All clients of Unix sockets look alike: they share nothing.
+// Calls with the same name share the room that one client may have. All clients of Unix sockets have the same address,
+// so they get no name.
 std::string peer_of(const grpc::CallbackServerContext& context) {
   std::string peer = context.peer();
   return peer.starts_with("unix:") ? "" : peer;
@@ -32,7 +33,7 @@ Call::Call(grpc::CallbackServerContext& context, Admission& admission, const Lim
   run(*this, course);
 }
 
-// When it has finished the call is no longer there.
+// Once it has said how the call finishes, the call may be gone.
 Detached Call::run(Call& call, Course course) {
   End end{{grpc::StatusCode::RESOURCE_EXHAUSTED, "the server is out of memory: try again later"}};
   try {

@@ -5,7 +5,7 @@
 namespace facetwise {
 namespace {
 
-// Of this thread: where it computes.
+// The Compute that this thread belongs to, if any.
 thread_local const Compute* works_for = nullptr;
 
 }  // namespace
@@ -29,7 +29,7 @@ void Compute::add(Job* job) {
   bool mine = works_for == this;
   {
     const std::lock_guard lock(mutex_);
-    // A thread that computes comes for the next job by itself; another need not come for that.
+    // A computing thread will take the next job by itself, so no other has to be woken for it.
     mine = mine && short_.empty() && long_.empty();
     (job->lanes_ - job->begin_ > kPiece ? long_ : short_).push_back(job);
   }
@@ -51,7 +51,7 @@ Compute::Job* Compute::take() {
 void Compute::work() {
   works_for = this;
   while (Job* job = take()) {
-    // The job is the call's, and may be gone when the call has gone on.
+    // The job belongs to the call: it may be gone once the call is resumed.
     if (run_turn(*job))
       job->call_.resume();
     else

@@ -9,7 +9,7 @@
 
 namespace facetwise {
 
-// What a coroutine will return. It begins when it is awaited, and throws there what it has thrown.
+// A coroutine that returns a T. It begins when it is awaited; what it throws is thrown there.
 template <class T>
 class Task {
  public:

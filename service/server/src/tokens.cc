@@ -11,7 +11,7 @@
 namespace facetwise {
 namespace {
 
-// In a time that does not tell how much of a token is right.
+// Takes a time that does not depend on how much of a token is right.
 bool equal(absl::string_view a, const std::string& b) {
   return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), b.size()) == 0;
 }
