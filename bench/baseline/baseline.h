@@ -34,9 +34,10 @@ inline float pdf_reflection(Sampler sampler, Vector i, Vector o, float alpha_x, 
 inline float evaluate_reflection(Shadowing shadowing, Vector i, Vector o, float alpha_x, float alpha_y);
 inline float masking(Vector i, float alpha_x, float alpha_y);
 
-// Of any of these models (has_baseline()): GGX with Smith masking as above; Beckmann with Smith by `ndf` and `visible`
-// (slope inversion by Newton's method: Heitz & d'Eon 2014, Jakob 2014); Student-t with Smith by `ndf`; V-cavity with
-// these three, by `ndf` and `visible` (flipping: Heitz & d'Eon 2014), only for i_z > 0.
+// Of any of these models (has_baseline()): GGX with Smith masking as above; Beckmann and Student-t with Smith by `ndf` and
+// `visible` (slope inversion by Newton's method: Heitz & d'Eon 2014, Jakob 2014), Beckmann by `exact` too; V-cavity with
+// these three and Phong, only for i_z > 0, by `ndf` and `visible` (flipping: Heitz & d'Eon 2014), and but for Phong by
+// `exact`. `exact` is facetwise's own (docs/models.md), written as a renderer would: std::erf, Newton's method.
 struct Model {
   Distribution distribution = Distribution::ggx;
   Masking masking = Masking::smith;

@@ -10,6 +10,9 @@ std::uint64_t run_masking(const Loop& loop) {
     case Distribution::ggx: return run_model<Model{Distribution::ggx, masking}>(loop);
     case Distribution::beckmann: return run_model<Model{Distribution::beckmann, masking}>(loop);
     case Distribution::student_t: return run_model<Model{Distribution::student_t, masking}>(loop);
+    case Distribution::phong:
+      if constexpr (masking == Masking::vcavity) return run_model<Model{Distribution::phong, masking}>(loop);
+      return 0;
     default: return 0;
   }
 }
