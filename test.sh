@@ -56,7 +56,10 @@ if [ -n "$sanitize" ]; then
     echo "build (build/$preset)"
     logged "configure-$preset" cmake --preset "$preset"
     logged "build-$preset" cmake --build "build/$preset" --target sanitized_tests
-    ctest --test-dir "build/$preset" --output-on-failure -j2 -L 'determinism|faults|table|fuzz|service' || failed=1
+    # ThreadSanitizer does not know gRPC's locks, so that whatever crosses a call looks like a race: `turns` is what the
+    # server's calls share, without gRPC.
+    service=$([ "$preset" = sanitize ] && echo '|service' || true)
+    ctest --test-dir "build/$preset" --output-on-failure -j2 -L "determinism|faults|table|fuzz|turns$service" || failed=1
   done
   exit "$failed"
 fi
