@@ -36,8 +36,10 @@ struct CallTools {
 Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, const CallTools& tools);
 Task<absl::StatusOr<grpc::ByteBuffer>> answer_compact(grpc::ByteBuffer& request, const CallTools& tools);
 
-// Awaited first by both: counts the call, and its request as received and decoded, and waits for its turn.
+// Awaited first by both: counts the call, and its request as received and decoded. A request that is not small waits for its
+// turn before it is decoded, the others after that.
 Task<absl::Status> begin_answer(const grpc::ByteBuffer& request, const CallTools& tools);
+bool is_small(const grpc::ByteBuffer& request);
 
 // Errors that both make.
 absl::Status invalid_field(absl::string_view field, absl::string_view what);

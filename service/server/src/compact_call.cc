@@ -104,6 +104,7 @@ absl::Status check_request(const Decoded& decoded, const Limits& limits) {
 }  // namespace
 
 Task<absl::StatusOr<grpc::ByteBuffer>> answer_compact(grpc::ByteBuffer& request, const CallTools& tools) {
+  const bool is_short = is_small(request);
   if (auto status = co_await begin_answer(request, tools); !status.ok()) co_return status;
   Decoded decoded;
   if (auto status = Decoder(request).read(decoded); !status.ok()) co_return status;
@@ -126,6 +127,10 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_compact(grpc::ByteBuffer& request,
   for (std::size_t k = 1; k < columns; ++k)
     dense.push_back({decoded.columns[k - 1], {reinterpret_cast<float*>(values(k)), decoded.lanes}});
   compaction.columns = dense;
+  if (is_short && !tools.compute.idle()) {
+    auto turn = tools.compute.turn(false);
+    co_await turn;
+  }
   absl::StatusOr<std::size_t> accepted;
   auto computed = tools.compute.each(0, [&](std::size_t, std::size_t, const Execution& execution) {
     accepted = compact(compaction, execution);

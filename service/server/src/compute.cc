@@ -79,6 +79,11 @@ bool Compute::run_turn(Job& job) {
   return job.begin_ >= job.lanes_;
 }
 
+bool Compute::idle() const {
+  const std::lock_guard lock(mutex_);
+  return working_ == 0 && short_.empty() && long_.empty();
+}
+
 bool Compute::alone() const {
   const std::lock_guard lock(mutex_);
   return working_ == 1;

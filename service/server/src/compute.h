@@ -33,6 +33,9 @@ class Compute {
   // Awaitable: the call goes on on a thread that computes, when its turn comes. `is_long`: after those that are short.
   auto turn(bool is_long) { return Job{*this, is_long ? kPiece + 1 : 0, {}}; }
 
+  // Whether no call computes or waits: one may then compute a little where it is.
+  bool idle() const;
+
   // Awaitable, of a call that has its turn: piece() for pieces that make up [0, lanes), as long as it returns true; once if
   // there are no lanes. A piece spreads over threads only while no other call computes.
   auto each(std::size_t lanes, Piece piece) { return Job{*this, lanes, std::move(piece)}; }
