@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <map>
 #include <memory>
 #include <stdexcept>
 
+#include "absl/strings/ascii.h"
 #include "app/arguments.h"
 #include "app/benchmark_messages.h"
 #include "app/errors.h"
@@ -23,7 +27,7 @@ struct ServeVerb {
   std::size_t max_tables_mib = 256;
   int drain_seconds = 10, read_seconds = 20, write_seconds = 60, patience_ms = 2000, stream_idle_seconds = 300,
       table_idle_seconds = 3600;
-  std::string unix_mode = "0600";
+  std::string unix_mode = "0600", config;
 
   int run() {
     if (max_mib_in_flight < 5 * max_message_mib)
@@ -53,6 +57,43 @@ struct ServeVerb {
   }
 };
 
+// Gives the options that the command line does not: from the environment, else from a file.
+absl::Status fill_options(CLI::App& command, const std::string& path) {
+  std::map<std::string, std::vector<std::string>> file;
+  if (!path.empty()) {
+    std::ifstream in(path);
+    if (!in) return absl::NotFoundError(fmt::format("--config: {}: cannot be read", path));
+    for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(in)) file[item.fullname()] = item.inputs;
+  }
+  for (const auto& [name, values] : file)
+    if (name == "config" || command.get_option_no_throw("--" + name) == nullptr)
+      return invalid("{}: {}: not an option of serve", path, name);
+  for (CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_lnames().front();
+    if (option->count() > 0 || name == "help" || name == "config") continue;
+    std::string variable = "FACETWISE_SERVE_" + name;
+    for (char& letter : variable) letter = letter == '-' ? '_' : absl::ascii_toupper(letter);
+    std::vector<std::string> values;
+    std::string where = variable;
+    if (const char* value = std::getenv(variable.c_str())) {
+      values = {value};
+    } else if (const auto in_file = file.find(name); in_file != file.end()) {
+      values = in_file->second;
+      where = fmt::format("{}: {}", path, name);
+    } else {
+      continue;
+    }
+    try {
+      const bool is_flag = option->get_type_size() == 0;
+      for (const std::string& value : values) option->add_result(is_flag ? option->get_flag_value(name, value) : value);
+      option->run_callback();
+    } catch (const CLI::Error& error) {
+      return invalid("{}: {}", where, error.what());
+    }
+  }
+  return absl::OkStatus();
+}
+
 std::string check_mode(const std::string& text) {
   const bool octal = !text.empty() && text.size() <= 4 && text.find_first_not_of("01234567") == std::string::npos;
   return octal && std::stoul(text, nullptr, 8) <= 0777 ? "" : fmt::format("\"{}\" is not a mode such as 0660", text);
@@ -68,7 +109,8 @@ Verb add_serve(CLI::App& app) {
       R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol
 is proto/facetwise/v1/sampler.proto; health checks and reflection are on. For other machines give a certificate
 (--tls-certificate, --tls-key), and ask for tokens (--token-file) or for clients' certificates (--tls-client-ca). All
-these files are read again when they change.
+these files are read again when they change. An option that is not given is taken from the environment (FACETWISE_SERVE_THREADS
+for --threads), else from the file of --config.
 
 Examples:
   facetwise serve --listen unix:/tmp/facetwise.sock
@@ -77,7 +119,6 @@ Examples:
   command
       .add_option("--listen", options.listen,
                   "Where to listen; may be repeated. Port 0 takes a free one, which is printed")
-      ->required()
       ->allow_extra_args(false)
       ->option_text("unix:PATH|HOST:PORT (required)");
   const auto add_number = [&](const char* flag, auto& number, int least, int most, const char* help) {
@@ -124,7 +165,15 @@ Examples:
   command.add_flag("--allow-benchmark", options.allow_benchmark, "Let clients run benchmarks on this machine");
   add_named(command, "--target", options.execution.target, parse_target, "Instruction set of the kernels; default best",
             "best|scalar|avx2|avx3|neon");
-  return {&command, [arguments] { return arguments->run(); }};
+  command.add_option("--config", arguments->config, "Take options from this file too, a line each as in threads=4")
+      ->option_text("FILE");
+  return {&command, [arguments, &command] {
+            const absl::Status status = fill_options(command, arguments->config);
+            if (!status.ok()) return fail("serve", status);
+            if (!arguments->options.listen.empty()) return arguments->run();
+            fmt::print(stderr, "--listen is required\nRun with --help for more information.\n");
+            return kUsage;
+          }};
 }
 
 }  // namespace facetwise::app

@@ -12,7 +12,7 @@ namespace {
 TEST(Help, EveryVerbExplainsItselfWithAnExample) {
   const auto all = facetwise({"--help"});
   ASSERT_EQ(all.code, 0);
-  for (const std::string verb : {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info"}) {
+  for (const std::string verb : {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info", "load"}) {
     EXPECT_NE(all.out.find("\n  " + verb + " "), std::string::npos) << verb;
     const auto help = facetwise({verb, "--help"});
     EXPECT_EQ(help.code, 0);
@@ -113,6 +113,73 @@ TEST(VerifyVerb, NamesAMissingMesh) {
   const auto result = facetwise({"verify", "--remote", "unix:/none", "--mesh", "/none.obj"});
   EXPECT_EQ(result.code, 1);
   EXPECT_NE(result.err.find("/none.obj: "), std::string::npos) << result.err;
+}
+
+// Every call that was due is counted, the percentiles and the histogram are of them.
+TEST(Load, CountsEveryCall) {
+  const Directory directory;
+  Server server(directory);
+  const std::vector<std::string> arguments = {"load",   "--remote", server.address(), "--lanes", "100",
+                                              "--rate", "200",      "--seconds",      "0.5"};
+  const auto text = facetwise(arguments);
+  ASSERT_EQ(text.code, 0) << text.err;
+  EXPECT_NE(text.out.find("100 calls of 100 lanes"), std::string::npos) << text.out;
+  auto with_json = arguments;
+  with_json.insert(with_json.end(), {"--json", "--beside", "1", "--beside-lanes", "50000"});
+  const auto result = facetwise(with_json);
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto load = nlohmann::json::parse(result.out);
+  EXPECT_EQ(load["calls"], 100);
+  EXPECT_EQ(load["failed"], 0);
+  EXPECT_GE(load["seconds"], 0.49);  // the last was due then
+  EXPECT_GT(load["beside"]["lanes_per_second"], 0);
+  double before = 0;
+  for (const char* name : {"p50", "p90", "p99", "p99.9", "max"}) {
+    EXPECT_GE(load["microseconds"][name], before);
+    before = load["microseconds"][name];
+  }
+  EXPECT_GT(before, 0);
+  std::size_t calls = 0;
+  for (const auto& bar : load["histogram"]) calls += bar["calls"].get<std::size_t>();
+  EXPECT_EQ(calls, 100u);
+  EXPECT_LE(load["histogram"].front()["from"], load["microseconds"]["p50"]);
+  EXPECT_GT(load["histogram"].back()["to"], load["microseconds"]["max"]);
+  EXPECT_EQ(server.stop(), 0);
+  EXPECT_EQ(facetwise(arguments).code, 1) << "nobody there";
+}
+
+// Options of a server come from its command line, else from the environment, else from a file.
+TEST(Serve, TakesItsOptionsFromTheEnvironmentAndAFile) {
+  const Directory directory;
+  write_file(directory.path("serve.ini"), "# of a test\nthreads = 3\nmax-message-mib=5\nallow-benchmark=true\n");
+  setenv("FACETWISE_SERVE_MAX_MESSAGE_MIB", "4", 1);
+  setenv("FACETWISE_SERVE_TARGET", "scalar", 1);
+  nlohmann::json info;
+  {
+    Server server(directory, "s.sock", {"--config", directory.path("serve.ini"), "--threads", "2"});
+    const auto result = facetwise({"info", "--json", "--remote", server.address()});
+    ASSERT_EQ(result.code, 0) << result.err;
+    info = nlohmann::json::parse(result.out);
+  }
+  unsetenv("FACETWISE_SERVE_MAX_MESSAGE_MIB");
+  unsetenv("FACETWISE_SERVE_TARGET");
+  EXPECT_EQ(info["threads"], 2);
+  EXPECT_EQ(info["benchmark_allowed"], true);
+  EXPECT_EQ(info["max_message_bytes"], 4 << 20);
+  EXPECT_EQ(info["target"], "scalar");
+  // What is wrong is named, and the server does not start.
+  write_file(directory.path("wrong.ini"), "treads=3\n");
+  const auto key =
+      facetwise({"serve", "--listen", "unix:" + directory.path("w"), "--config", directory.path("wrong.ini")});
+  EXPECT_EQ(key.code, 1);
+  EXPECT_NE(key.err.find("treads: not an option of serve"), std::string::npos) << key.err;
+  write_file(directory.path("wrong.ini"), "threads=many\n");
+  const auto value =
+      facetwise({"serve", "--listen", "unix:" + directory.path("w"), "--config", directory.path("wrong.ini")});
+  EXPECT_NE(value.code, 0);
+  EXPECT_NE(value.err.find("threads"), std::string::npos) << value.err;
+  EXPECT_NE(
+      facetwise({"serve", "--listen", "unix:" + directory.path("w"), "--config", directory.path("none.ini")}).code, 0);
 }
 
 }  // namespace
