@@ -42,9 +42,11 @@ struct Inputs {
   In ix, iy, iz, ax, ay;
 };
 
+// Where the engine's sampler reads it, so that the column is there.
 template <Model model, Sampler sampler>
-constexpr bool needs_u3 = sampler == Sampler::exact ||
-                          (sampler == Sampler::visible && model.masking == Masking::vcavity);
+constexpr bool needs_u3 =
+    model.masking == Masking::vcavity ? sampler == Sampler::exact || sampler == Sampler::visible
+                                      : sampler == Sampler::exact&& model.distribution == Distribution::ggx;
 
 template <Model model, Sampler sampler>
 FACETWISE_FLATTEN std::uint64_t sample_normals(const Loop& loop) {

@@ -109,6 +109,25 @@ TEST(RunBench, EveryOperationAndInputRuns) {
   }
 }
 
+// The models' baselines run with the columns that the engine's samplers read, and lose about as many samples.
+TEST(RunBench, EveryModelsBaselineRuns) {
+  auto options = small_run("^sample_reflection/.*/mixed/65536/(scalar|simd)$");
+  options.limits = false;
+  options.min_seconds = 0.001;
+  const auto report = run_bench(options);
+  ASSERT_TRUE(report.ok()) << report.status();
+  std::map<std::string, double> occluded;
+  for (const BenchResult& r : report->results) occluded[r.name()] = r.share_occluded();
+  int baselines = 0;
+  for (const auto& [name, share] : occluded) {
+    const auto scalar = name.find("/scalar");
+    if (scalar == std::string::npos) continue;
+    ++baselines;
+    EXPECT_NEAR(share, occluded.at(name.substr(0, scalar) + "/simd"), 0.1) << name;
+  }
+  EXPECT_EQ(baselines, 5 + 16);  // GGX's with Smith masking, and all other models' but tables'
+}
+
 TEST(RunBench, TargetsAreForced) {
   for (const Target target : available_targets()) {
     auto options = small_run("bounded/0.3,0.3/4096/simd$");
