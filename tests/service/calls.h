@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "facetwise/v1/sampler.grpc.pb.h"
+#include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
 
 namespace facetwise::testing {
@@ -43,5 +44,50 @@ inline v1::BatchRequest good_request(std::size_t lanes) {
     request.add_outputs(output);
   return request;
 }
+
+// Calls that have begun and send nothing.
+class SilentCalls {
+ public:
+  explicit SilentCalls(std::shared_ptr<grpc::Channel> channel) : stub_(std::move(channel)) {}
+  ~SilentCalls() {
+    for (auto& call : calls_) call->context.TryCancel();
+    end();
+  }
+  SilentCalls(const SilentCalls&) = delete;
+  SilentCalls& operator=(const SilentCalls&) = delete;
+
+  // "/package.Service/Method". Returns when it has begun.
+  void begin(const std::string& method) {
+    auto& call = *calls_.emplace_back(std::make_unique<Call>());
+    call.stream = stub_.PrepareCall(&call.context, method, &queue_);
+    call.stream->StartCall(&call);
+    wait();
+  }
+  // Waits until the server has ended all of them.
+  std::vector<grpc::Status> end() {
+    std::vector<grpc::Status> statuses(calls_.size());
+    for (std::size_t k = 0; k < calls_.size(); ++k) {
+      calls_[k]->stream->Finish(&statuses[k], nullptr);
+      wait();
+    }
+    calls_.clear();
+    return statuses;
+  }
+
+ private:
+  struct Call {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::GenericClientAsyncReaderWriter> stream;
+  };
+  void wait() {
+    void* tag = nullptr;
+    bool good = false;
+    queue_.Next(&tag, &good);
+  }
+
+  grpc::GenericStub stub_;
+  grpc::CompletionQueue queue_;
+  std::vector<std::unique_ptr<Call>> calls_;
+};
 
 }  // namespace facetwise::testing

@@ -26,6 +26,7 @@ using grpc::StatusCode;
 using testing::good_request;
 using testing::open_channel;
 using testing::ServerProcess;
+using testing::SilentCalls;
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 // What a process holds; AddressSanitizer keeps what is freed.
@@ -251,19 +252,9 @@ TEST_F(HostileClients, ThatSendNothingKeepNobodyOut) {
   ASSERT_TRUE(server.ready());
   EXPECT_TRUE(run(3).ok());
   const long threads = server.status("Threads");
-  grpc::GenericStub stub(open_channel(address()));
-  grpc::CompletionQueue queue;
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
-  std::vector<std::unique_ptr<grpc::GenericClientAsyncReaderWriter>> calls;
-  for (int k = 0; k < 128; ++k) {
-    contexts.push_back(std::make_unique<grpc::ClientContext>());
-    const char* method = k % 2 == 0 ? "/facetwise.v1.Sampler/Run" : "/facetwise.v1.Sampler/RunStream";
-    calls.push_back(stub.PrepareCall(contexts.back().get(), method, &queue));
-    calls.back()->StartCall(calls.back().get());
-    void* tag = nullptr;
-    bool good = false;
-    ASSERT_TRUE(queue.Next(&tag, &good) && good);
-  }
+  SilentCalls silent(open_channel(address()));
+  for (int k = 0; k < 128; ++k)
+    silent.begin(k % 2 == 0 ? "/facetwise.v1.Sampler/Run" : "/facetwise.v1.Sampler/RunStream");
   EXPECT_TRUE(run(1000).ok());
   EXPECT_TRUE(run(1000).ok());
   EXPECT_LE(server.status("Threads"), threads + kOthers);
@@ -272,14 +263,6 @@ TEST_F(HostileClients, ThatSendNothingKeepNobodyOut) {
   server.signal(SIGTERM);
   EXPECT_EQ(server.wait(), 0);
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(9));
-  for (auto& context : contexts) context->TryCancel();
-  for (auto& call : calls) {
-    grpc::Status status;
-    call->Finish(&status, nullptr);
-    void* tag = nullptr;
-    bool good = false;
-    queue.Next(&tag, &good);
-  }
 }
 
 // Streams that are idle and connections that do nothing cost no thread and little memory.
@@ -349,30 +332,11 @@ TEST_F(HostileClients, ThatReflectForEverAreLimited) {
   ASSERT_TRUE(server.ready());
   EXPECT_TRUE(run(1000).ok());
   const long threads = server.status("Threads");
-  grpc::GenericStub stub(open_channel(address()));
-  grpc::CompletionQueue queue;
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
-  std::vector<std::unique_ptr<grpc::GenericClientAsyncReaderWriter>> calls;
-  for (int k = 0; k < 92; ++k) {
-    contexts.push_back(std::make_unique<grpc::ClientContext>());
-    calls.push_back(stub.PrepareCall(contexts.back().get(),
-                                     "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", &queue));
-    calls.back()->StartCall(calls.back().get());
-    void* tag = nullptr;
-    bool good = false;
-    ASSERT_TRUE(queue.Next(&tag, &good));
-  }
+  SilentCalls silent(open_channel(address()));
+  for (int k = 0; k < 92; ++k) silent.begin("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo");
   EXPECT_TRUE(run(1000).ok());
   EXPECT_EQ(testing::Health(open_channel(address())).check(""), testing::Health::serving);
   EXPECT_LE(server.status("Threads"), threads + 16 + kOthers);
-  for (auto& context : contexts) context->TryCancel();
-  for (auto& call : calls) {
-    grpc::Status status;
-    call->Finish(&status, nullptr);
-    void* tag = nullptr;
-    bool good = false;
-    queue.Next(&tag, &good);
-  }
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 
 #include "calls.h"
 #include "facetwise/client.h"
-#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "health.h"
 #include "server_process.h"
@@ -215,28 +214,10 @@ TEST_F(Lifetime, LimitsThatAnswerNothingAreRefused) {
 TEST_F(Lifetime, CallsThatSendNothingAreEnded) {
   ServerProcess server({"--listen", unix_address(), "--read-ms", "200", "--idle-ms", "400"});
   ASSERT_TRUE(server.ready());
-  // Headers and no message.
-  const auto channel = open_channel(unix_address());
-  grpc::GenericStub generic(channel);
-  grpc::CompletionQueue queue;
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
-  std::vector<std::unique_ptr<grpc::GenericClientAsyncReaderWriter>> calls;
-  for (const char* method : {"Run", "Compact", "RunStream", "CompactStream"}) {
-    contexts.push_back(std::make_unique<grpc::ClientContext>());
-    calls.push_back(generic.PrepareCall(contexts.back().get(), std::string("/facetwise.v1.Sampler/") + method, &queue));
-    calls.back()->StartCall(calls.back().get());
-    void* tag = nullptr;
-    bool good = false;
-    ASSERT_TRUE(queue.Next(&tag, &good) && good);
-  }
-  for (auto& call : calls) {
-    grpc::Status ended;
-    call->Finish(&ended, call.get());
-    void* tag = nullptr;
-    bool good = false;
-    ASSERT_TRUE(queue.Next(&tag, &good));
-    EXPECT_EQ(ended.error_code(), StatusCode::CANCELLED);
-  }
+  testing::SilentCalls silent(open_channel(unix_address()));
+  for (const char* method : {"Run", "Compact", "RunStream", "CompactStream"})
+    silent.begin(std::string("/facetwise.v1.Sampler/") + method);
+  for (const grpc::Status& ended : silent.end()) EXPECT_EQ(ended.error_code(), StatusCode::CANCELLED);
   EXPECT_TRUE(run(*stub_of(unix_address()), 3).ok());
 }
 

@@ -9,8 +9,8 @@
 
 namespace facetwise {
 
-// A Unix socket's path, held by a lock beside it: gRPC would let a second server on the same path take the
-// first one's place without a word.
+// A Unix socket's path, held by a lock beside it. A server has to remove the socket that a dead one left, and without the lock
+// it would remove a living one's.
 class SocketLock {
  public:
   SocketLock() = default;
