@@ -66,7 +66,8 @@ fw_status fw_clear_generator(fw_batch* batch);
 
 /* This machine's engine. target: "best", "scalar", "avx2", "avx3" or "neon"; NULL: best. */
 fw_engine* fw_local(const char* target);
-/* Servers', each "unix:PATH" or "HOST:PORT". The options may be NULL, and so may each of them. */
+/* Servers', each "unix:PATH" or "HOST:PORT": lanes are spread over those that are there, and one is enough. The options may be
+   NULL, and so may each of them. */
 typedef struct fw_connection {
   const char *tls_ca, *tls_certificate, *tls_key, *tls_name; /* PEM files; the name in the server's certificate */
   const char* token_file;

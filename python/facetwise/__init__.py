@@ -310,7 +310,7 @@ def local(target: Optional[str] = None) -> Engine:
 
 def connect(*addresses: str, tls_ca: Optional[str] = None, tls_certificate: Optional[str] = None,
             tls_key: Optional[str] = None, tls_name: Optional[str] = None, token_file: Optional[str] = None) -> Engine:
-    """Servers', each "unix:PATH" or "HOST:PORT": a batch's lanes are spread over them."""
+    """Servers', each "unix:PATH" or "HOST:PORT": a batch's lanes are spread over those that are there, and one is enough."""
     encoded = (ctypes.c_char_p * len(addresses))(*(address.encode() for address in addresses))
     options = _Connection(*(None if value is None else os.fsencode(value)
                             for value in (tls_ca, tls_certificate, tls_key, tls_name, token_file)))
