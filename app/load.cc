@@ -64,12 +64,15 @@ absl::StatusOr<LoadResult> run_load(const LoadOptions& options, const std::funct
     if (auto status = first.run(*engines[static_cast<std::size_t>(n)]); !status.ok()) return status;
 
   std::atomic<std::size_t> beside_calls = 0;
+  std::atomic<int> at_work = 0;
   for (int n = 0; n < options.beside; ++n)
     beside.emplace_back([&, engine = engines[static_cast<std::size_t>(options.connections + n)].get()] {
       const Call call(options.beside_lanes);
-      while (!over && call.run(*engine).ok()) ++beside_calls;
+      bool answered = call.run(*engine).ok();
+      ++at_work;
+      for (; !over && answered; ++beside_calls) answered = call.run(*engine).ok();
     });
-  if (options.beside > 0) std::this_thread::sleep_for(std::chrono::milliseconds(500));  // until they are at work
+  while (at_work < options.beside && !stop) std::this_thread::sleep_for(std::chrono::milliseconds(10));
 
   const std::size_t beside_before = beside_calls;
   const auto begin = Clock::now();

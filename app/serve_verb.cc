@@ -23,7 +23,7 @@ constexpr std::size_t kMiB = std::size_t{1} << 20;
 
 struct ServeVerb {
   ServerOptions options;
-  std::size_t max_message_mib = 16, max_mib_in_flight = 1024;
+  std::size_t max_message_mib = 16, max_mib_in_flight = 4096;
   std::size_t max_tables_mib = 256;
   int drain_seconds = 10, read_seconds = 20, write_seconds = 60, patience_ms = 2000, stream_idle_seconds = 300,
       table_idle_seconds = 3600;
@@ -128,7 +128,7 @@ Examples:
   add_number("--max-message-mib", arguments->max_message_mib, 1, 1024, "Largest request and response; default 16");
   add_number("--max-mib-in-flight", arguments->max_mib_in_flight, 1, 1 << 24,
              "Messages held at once: half are requests on their way, which wait for room; beyond the rest, calls get "
-             "RESOURCE_EXHAUSTED; default 1024");
+             "RESOURCE_EXHAUSTED; default 4096");
   add_number("--max-calls", options.max_calls, 1, 1 << 20,
              "Calls worked on at once; beyond, they get RESOURCE_EXHAUSTED; default 128");
   add_number("--max-open-calls", options.max_open_calls, 1, 1 << 20,

@@ -52,7 +52,7 @@ struct ServerOptions {
   // Bytes of messages at once: half are for requests on their way, each of which counts as max_message_bytes and waits
   // until there is room; the rest are for requests (as received, and as decoded) and answers, and a call that would go
   // above gets RESOURCE_EXHAUSTED. Five times max_message_bytes at least.
-  std::size_t max_bytes_in_flight = std::size_t{1} << 30;
+  std::size_t max_bytes_in_flight = std::size_t{1} << 32;
   // Connections at once; further ones wait until one is closed. Never more than the process may have open files, less some.
   int max_connections = 4096;
   // Tables of slopes that clients upload: largest of one, of all together, and how long one stays that nobody uses.
