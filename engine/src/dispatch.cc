@@ -17,25 +17,25 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-#define FACETWISE_DECLARE(Name)             \
-  extern const DistributionKernels k##Name; \
-  extern const DistributionKernels kOneLane##Name;
+#define FACETWISE_DECLARE(Name) extern const DistributionKernels k##Name;
+#define FACETWISE_ENTRY(Name) &k##Name,
 FACETWISE_DISTRIBUTIONS(FACETWISE_DECLARE)
+extern const TargetKernels kTable;
+const TargetKernels kTable = {
+    {FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<Full>, hn::MaxLanes(Full()), kStreams<Full>, hwy::FlushStream};
+#undef FACETWISE_ENTRY
 #undef FACETWISE_DECLARE
 
-extern const TargetKernels kTable;
-extern const TargetKernels kOneLaneTable;
-#define FACETWISE_ENTRY(Name) &k##Name,
-const TargetKernels kTable = {{FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)},
-                              Philox<hn::ScalableTag<float>>,
-                              hn::MaxLanes(hn::ScalableTag<float>()),
-                              kStreams<hn::ScalableTag<float>>,
-                              hwy::FlushStream};
-#undef FACETWISE_ENTRY
+#if FACETWISE_HAS_ONE_LANE
+#define FACETWISE_DECLARE(Name) extern const DistributionKernels kOneLane##Name;
 #define FACETWISE_ENTRY(Name) &kOneLane##Name,
+FACETWISE_DISTRIBUTIONS(FACETWISE_DECLARE)
+extern const TargetKernels kOneLaneTable;
 const TargetKernels kOneLaneTable = {
-    {FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<hn::CappedTag<float, 1>>, 1, false, hwy::FlushStream};
+    {FACETWISE_DISTRIBUTIONS(FACETWISE_ENTRY)}, Philox<Single>, 1, false, hwy::FlushStream};
 #undef FACETWISE_ENTRY
+#undef FACETWISE_DECLARE
+#endif
 
 }  // namespace HWY_NAMESPACE
 }  // namespace facetwise
@@ -55,7 +55,7 @@ struct CompiledTarget {
 // Best first.
 constexpr CompiledTarget kCompiled[] = {
 #if HWY_TARGETS & HWY_AVX3
-    {Target::avx3, HWY_AVX3, &N_AVX3::kTable, &N_AVX3::kOneLaneTable},
+    {Target::avx3, HWY_AVX3, &N_AVX3::kTable, &N_AVX2::kOneLaneTable},
 #endif
 #if HWY_TARGETS & HWY_AVX2
     {Target::avx2, HWY_AVX2, &N_AVX2::kTable, &N_AVX2::kOneLaneTable},

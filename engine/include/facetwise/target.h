@@ -50,7 +50,7 @@ enum class Threads : std::uint8_t {
 // How a call runs. The defaults are right for everything but tests and benchmarks.
 struct Execution {
   Target target = Target::best;
-  // Kernels one lane wide on the same target: what the vector width is worth. For benchmarks.
+  // Kernels one lane wide: what the vector width is worth. For avx3 they are those of avx2. For benchmarks.
   bool one_lane = false;
   Threads threads = Threads::automatic;
   Stores stores = Stores::automatic;

@@ -60,12 +60,19 @@ struct Registrar {
 }  // namespace facetwise
 HWY_AFTER_NAMESPACE();
 
-// Defines k<Name> and kOneLane<Name> from a template Make<Name><D, Pairs>() that gives DistributionKernels.
+// Defines k<Name> and, where there is one, kOneLane<Name> from a template Make<Name><D, Pairs>() that gives
+// DistributionKernels.
 #undef FACETWISE_REGISTER
-#define FACETWISE_REGISTER(Name)                                                                           \
-  extern const DistributionKernels k##Name;                                                                \
-  extern const DistributionKernels kOneLane##Name;                                                         \
-  const DistributionKernels k##Name = Make##Name<hn::ScalableTag<float>, Twice<hn::ScalableTag<float>>>(); \
-  const DistributionKernels kOneLane##Name = Make##Name<hn::CappedTag<float, 1>, hn::CappedTag<float, 1>>();
+#if FACETWISE_HAS_ONE_LANE
+#define FACETWISE_REGISTER(Name)                                     \
+  extern const DistributionKernels k##Name;                          \
+  extern const DistributionKernels kOneLane##Name;                   \
+  const DistributionKernels k##Name = Make##Name<Full, FullPairs>(); \
+  const DistributionKernels kOneLane##Name = Make##Name<Single, Single>();
+#else
+#define FACETWISE_REGISTER(Name)            \
+  extern const DistributionKernels k##Name; \
+  const DistributionKernels k##Name = Make##Name<Full, FullPairs>();
+#endif
 
 #endif

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "hwy/highway.h"
 
@@ -54,6 +55,15 @@ struct TagTraits<Twice<D>> {
   template <class T>
   using Rebound = Twice<hn::Rebind<T, D>>;
 };
+
+// AVX-512 has AVX2's scalar instructions, so that kernels one lane wide are compiled once for both.
+#undef FACETWISE_HAS_ONE_LANE
+#define FACETWISE_HAS_ONE_LANE (HWY_TARGET != HWY_AVX3)
+
+// Where vectors have one lane, pairs are not worth their compilation.
+using Full = hn::ScalableTag<float>;
+using Single = hn::CappedTag<float, 1>;
+using FullPairs = std::conditional_t<HWY_TARGET == HWY_SCALAR, Full, Twice<Full>>;
 
 // Whether there are streaming stores: on x86, where two of these vectors fill a line at the least.
 template <class D>
