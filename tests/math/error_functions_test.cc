@@ -230,8 +230,8 @@ TEST(ErrorFunctions, VisibleSlopesHaveTheirShare) {
       worst = std::max(worst, static_cast<double>(std::min(std::abs(share - u1[k]), std::abs(1 - share - u1[k]))));
     }
   }
-  std::printf("visible slopes: largest error of the share %.3g (stated 1e-6)\n", worst);
-  EXPECT_LE(worst, 1e-6);
+  std::printf("visible slopes: largest error of the share %.3g (stated 5e-7)\n", worst);
+  EXPECT_LE(worst, 5e-7);
 }
 
 }  // namespace

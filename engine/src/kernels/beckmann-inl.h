@@ -20,37 +20,51 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
   static constexpr bool kShifts = true;
   static constexpr bool kLongChains = true;
 
+  // The visible slopes' distribution along the azimuth, for k > 0: (k - x) e^(-x^2), x < k.
+  template <class D>
+  struct Kept {
+    using V = Vec<D>;
+    V k;
+    V beyond;  // share of all slopes above k
+    V total;   // sigma / sqrt(A)
+    HWY_INLINE Kept() {}
+    HWY_INLINE Kept(D d, V k_, V erfcx, V tail) : k(k_) {
+      const V half_gauss = Set(d, 0.5f) * Gauss(d, k);
+      beyond = half_gauss * erfcx;
+      total = Fma(half_gauss, tail, k);
+    }
+    // The share below x.
+    HWY_INLINE V ShareBelow(D d, V x) const {
+      return Fma(k, facetwise::HWY_NAMESPACE::ShareBelow(d, x), Set(d, 0.5f * kInverseRootPi) * Gauss(d, x)) / total;
+    }
+  };
+
   // w_z / sqrt(A) and sqrt(A).
   template <class D, class V = Vec<D>>
   static HWY_INLINE V Cotangent(D d, V z, V a, V& root) {
-    root = Sqrt(Max(a, Set(d, kSmallestA)));
+    root = Max(Sqrt(a), Set(d, kSmallestHorizontal));
     return z / root;
-  }
-  // 2 sigma for |z|: sigma(w) - w_z = sigma(-w).
-  template <class D, class V = Vec<D>>
-  static HWY_INLINE V FrontArea(D d, V k, V root, V tail) {
-    k = Abs(k);
-    return Fma(root * tail, Gauss(d, k), (root + root) * k);
   }
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Area(D d, I& i) {
     V root, erfcx, tail;
-    const V k = Cotangent(d, i.wz, i.a, root);
-    ErfcxAndTail(d, Abs(k), erfcx, tail);
-    i.two_sigma = FrontArea(d, k, root, tail);
+    const V k = Abs(Cotangent(d, i.wz, i.a, root));
+    ErfcxAndTail(d, k, erfcx, tail);
+    i.kept = Kept<D>(d, k, erfcx, tail);
+    i.two_sigma = (root + root) * i.kept.total;
     i.shift = Zero(d);
     if (!i.all_front) {
       i.two_sigma = Select(i.ahead, i.two_sigma, root * tail);
       i.shift = IfThenElseZero(Not(i.ahead), k * k);
     }
   }
+  // sigma(w) - w_z = sigma(-w).
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void BiasedArea(D d, I& i) {
-    V root, erfcx, tail;
-    const V k = Cotangent(d, i.wz, i.a, root);
-    ErfcxAndTail(d, Abs(k), erfcx, tail);
-    i.two_normaliser = FrontArea(d, k, root, tail);
+    V root;
+    Cotangent(d, i.wz, i.a, root);
+    i.two_normaliser = (root + root) * i.kept.total;
     i.shift = Zero(d);
   }
   // 2 sigma(-o) times e^(shift) of i: both may underflow, their quotient does not.
@@ -89,77 +103,88 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
 
   // Visible slopes by inversion: x along the azimuth, y independent of it.
   template <class D, class I, class V = Vec<D>>
-  static HWY_INLINE void DrawVisible(D d, const I&, V c, V s, V u1, V u2, V& x, V& y, V& gap) {
-    const V one = Set(d, 1.0f);
-    const V k = c / Max(s, Set(d, kVertical));
+  static HWY_INLINE void DrawVisible(D d, const I& i, V horizontal, V u1, V u2, V& x, V& y, V& im) {
     V t;
-    VisibleSlope(d, k, u1, x, t);
-    gap = Select(k > one, Max(NegFma(s, x, c), Zero(d)), s * t);
-    y = NormalSlope(d, u2, one - u2);
+    FrontSlope(d, i.kept, u1, x, t);
+    im = Select(i.kept.k > Set(d, 1.0f), Max(NegFma(horizontal, x, i.wz), Zero(d)), horizontal * t);
+    if (!i.all_front) {
+      V behind_x;
+      BehindSlope(d, i.kept.k, u1, behind_x, t);
+      x = Select(i.ahead, x, behind_x);
+      im = Select(i.ahead, im, horizontal * t);
+    }
+    y = NormalSlope(d, u2, Set(d, 1.0f) - u2);
   }
 
-  // The x with a share u of the visible slopes below, and t = k - x; their density is (k - x) e^(-x^2), x < k. With X =
-  // |x| and the functions of erf-inl.h, the integral below x is
-  //   (1/2) e^(-X^2) (tail(X) + t erfcx(X)) for x < 0,   k - (1/2) e^(-X^2) (t erfcx(X) - tail(X)) for x > 0,
-  // and in all k + (1/2) e^(-k^2) tail(k), for k < 0 (1/2) e^(-k^2) tail(-k), by which e^(-X^2) is then divided
-  // before it is formed: k^2 - X^2 = -t (t - 2 k). Of x and t the smaller is kept to all digits: x for k > 1. Three
-  // Halley steps; error of the share 1e-6.
+  // The x with a share u of the visible slopes below, and t = k - x. In the share P of all slopes, which are
+  // I(P) = e^(-x^2) / sqrt(pi) dense, that of the visible ones is (k P + I(P) / 2) / total. A start in P, fitted in
+  // 1 / (1 + k^2 / 4) and sqrt(1 - u), gives x by NormalSlope(); as P is known there, one step of Householder's third
+  // order leaves 2e-8, and float 5e-7. Of x and t the smaller is kept to all digits: x for k > 1.
   template <class D, class V = Vec<D>>
-  static HWY_NOINLINE void VisibleSlope(D d, V k, V u, V& x, V& t) {
-    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f);
+  static HWY_NOINLINE void FrontSlope(D d, const Kept<D>& kept, V u, V& x, V& t) {
+    const V one = Set(d, 1.0f), half = Set(d, 0.5f), fifth = Set(d, 0.2f);
     u = Max(u, Set(d, 0x1p-26f));
-    const V rest = one - u;
-    // Beyond 1e6 a slope's distribution does not change, in units of its own spread.
-    k = Min(Max(k, Set(d, -1e7f)), Set(d, 1e7f));
-    const V abs_k = Abs(k);
-    V erfcx, tail;
-    ErfcxAndTail(d, abs_k, erfcx, tail);
-    const auto front = k > zero;
-    const bool all_front = AllTrue(d, front);  // of k, which may be 0 where w_z is not
-
-    // The start. In front: the share of all slopes that are below x is u for k = infinity, and fitted for k -> 0.
-    V inverse_total;
-    {
-      const V share = NegFma(half * Gauss(d, abs_k), erfcx, one);
-      const V lambda = one / Fma(abs_k, Fma(abs_k, Set(d, 0.291728f), Set(d, 0.201865f)), one);
-      const V root = Sqrt(rest);
-      const V p = share * u * NegFma(lambda * root, NegFma(Set(d, 0.0583548f), rest, Set(d, 0.815317f)), one);
-      x = NormalSlope(d, p, one - p);
-      t = Max(k - x, IfThenElseZero(k < Set(d, 3.0f), Set(d, 0.526524f) * root));
-      inverse_total = one / Fma(half * Gauss(d, abs_k), tail, abs_k);
+    // Beyond 1e6 a slope's distribution does not change.
+    const V far = Set(d, 1e7f), k = Min(kept.k, far), total = Min(kept.total, far);
+    const V rest = one - u, root = Sqrt(rest);
+    const V near = one / Fma(Set(d, 0.25f) * k, k, one);
+    V excess = Set(d, 0.0f);  // P is (share below k) u (1 - excess)
+    for (const auto& row : kFrontStart) {
+      V p = Set(d, row[0]);
+      for (int c = 1; c < 4; ++c) p = Fma(p, near, Set(d, row[c]));
+      excess = Fma(excess, root, p);
     }
-    // Behind: t^2 = -log u for k = 0, and 2 |k| t - log(1 + 2 |k| t) = -log u for k = -infinity.
-    if (!all_front) {
-      const V l = Neg(Log(d, u));
-      const V far = l + Log(d, one + Fma(Set(d, 0.9f), l, Sqrt(l + l)));
-      const V weight = abs_k / (abs_k + Set(d, 0.6f));
-      const V sum = Fma(weight, far - l, l);
-      t = Select(front, t, sum / (abs_k + Sqrt(Fma(abs_k, abs_k, sum))));
-      inverse_total = Select(front, inverse_total, Set(d, 2.0f) / tail);
-    }
-    t = Max(t, Set(d, 1e-20f));
+    excess = excess * (near * root);
+    const V share = one - kept.beyond;
+    const V p = share * u * (one - excess);
+    x = NormalSlope(d, p, Fma(share, Fma(u, excess, rest), kept.beyond));
+    t = Max(k - x, half * root);
     const auto by_x = k > one;
-    x = Select(And(by_x, k >= Set(d, 3.0f)), x, k - t);
-    const V k_in_exponent = IfThenElseZero(Not(front), abs_k);
+    x = Select(by_x, x, k - t);
+
+    // With F the share below x: n = (u - F) total, g = F' t total.
+    const V gauss = Set(d, kInverseRootPi) * Gauss(d, x);
+    const V n = NegFma(k, p, NegFma(half, gauss, total * u));
+    const V g = gauss * (t * t), g2 = g * g, xt = x * t;
+    const V third = Fma(xt, xt, NegFma(half * t, t, xt)) * Set(d, 2.0f / 3.0f);
+    const V denominator = Fma(n * n, third, NegFma(Fma(Set(d, 2.0f), xt, one), g * n, g2));
+    const V change = t * n * NegFma(xt + half, n, g) / Max(denominator, fifth * g2);
+    const V least = fifth * t;
+    x = Min(x + change, k - least);
+    t = Max(t - change, least);
+    t = Select(by_x, k - x, t);
+    x = Select(by_x, x, k - t);
+  }
+
+  // The same behind, for -k. With the functions of erf-inl.h the integral below x is (1/2) e^(-x^2) (tail(-x) + t
+  // erfcx(-x)), and in all (1/2) e^(-k^2) tail(k), by which e^(-x^2) is divided before it is formed: x^2 - k^2 =
+  // t (t + 2 k). The start is fitted between t^2 = -log u for k = 0 and 2 k t - log(1 + 2 k t) = -log u for k = infinity.
+  // Three Halley steps; error of the share 1e-6.
+  template <class D, class V = Vec<D>>
+  static HWY_NOINLINE void BehindSlope(D d, V k, V u, V& x, V& t) {
+    const V one = Set(d, 1.0f), half = Set(d, 0.5f), two = Set(d, 2.0f);
+    u = Max(u, Set(d, 0x1p-26f));
+    k = Min(k, Set(d, 1e7f));
+    V erfcx, tail;
+    ErfcxAndTail(d, k, erfcx, tail);
+    const V inverse_total = two / tail;
+    const V l = Neg(Log(d, u));
+    const V far = l + Log(d, one + Fma(Set(d, 0.9f), l, Sqrt(l + l)));
+    const V weight = k / (k + Set(d, 0.6f));
+    const V sum = Fma(weight, far - l, l);
+    t = Max(sum / (k + Sqrt(Fma(k, k, sum))), Set(d, 1e-20f));
     for (int step = 0; step < 3; ++step) {
       V e, r;
-      ErfcxAndTail(d, Abs(x), e, r);
-      // x^2 - k^2 behind, x^2 in front
-      const V exponent = Select(front, x * x, t * Fma(Set(d, 2.0f), k_in_exponent, t));
-      const V gauss = Exp(d, Neg(exponent));
-      const V te = t * e;
-      const V below = half * gauss * (r + te), above = NegFma(half * gauss, te - r, k);
-      const V f = Fma(Select(x > zero, above, below), inverse_total, Neg(u));
+      ErfcxAndTail(d, k + t, e, r);
+      const V gauss = Exp(d, Neg(t * Fma(two, k, t)));
+      const V f = Fma(half * gauss * Fma(t, e, r), inverse_total, Neg(u));
       // dF/dt = -slope
       const V slope = Set(d, kInverseRootPi) * t * gauss * inverse_total;
       const V ratio = f / Max(slope, Set(d, 1e-30f));
-      const V bend = Fma(Set(d, 2.0f), x, one / t);
-      const V change = ratio / Max(Fma(half * ratio, bend, one), Set(d, 0.3f));
-      const V least = t * Set(d, 0.2f);
-      x = Select(by_x, Min(x - change, k - least), x);
-      t = Select(by_x, Max(k - x, Set(d, 1e-9f)), Max(t + change, least));
-      x = Select(by_x, x, k - t);
+      const V bend = NegFma(two, k + t, one / t);
+      t = Max(t + ratio / Max(Fma(half * ratio, bend, one), Set(d, 0.3f)), t * Set(d, 0.2f));
     }
+    x = Neg(k + t);
   }
 
   // V-cavity behind, k = |i_z| / sqrt(A): H = (S(k) - S(3 k)) / (2 k) with S(x) = e^(-x^2) tail(x), times e^(k^2). For
@@ -208,7 +233,7 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
     const V at3 = fall * Fma(two * k, erfcx3, tail3) / tail;
     const V u = Fma(u1, one - at3, at3);
     V visible, gap;
-    VisibleSlope(d, Neg(k), Min(u, Set(d, kLargestBelowOne)), visible, gap);
+    BehindSlope(d, k, Min(u, Set(d, kLargestBelowOne)), visible, gap);
     gap = Min(gap, two * k);
     const V along = Select(first, first_x, Neg(k + gap));
     const V across = NormalSlope(d, u2, one - u2);
@@ -218,6 +243,10 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
   }
 
  private:
+  // Of sqrt(1 - u): cubed, squared, itself; in each row of 1 / (1 + k^2 / 4) from its fourth power down.
+  static constexpr float kFrontStart[3][4] = {{-5.31641293f, 6.12924242f, 1.68662f, -1.89787829f},
+                                              {7.18497944f, -8.1968708f, -3.44422722f, 3.47614217f},
+                                              {-2.8960855f, 4.8478775f, -0.897981703f, 0.0613693595f}};
   // c_n (1 - 9^n), n = 8 ... 1.
   static constexpr float kHitSeries[] = {40.1562682f, -41.1859085f, 37.8576909f, -30.8465431f,
                                          22.0302599f, -13.6910006f, 7.52252778f, -4.51351667f};

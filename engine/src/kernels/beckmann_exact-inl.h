@@ -19,22 +19,22 @@ namespace HWY_NAMESPACE {
 template <class D>
 struct Ellipse {
   using V = Vec<D>;
-  Incidence<D> w;
-  V k;  // cot of the stretched incidence
+  V horizontal;
+  Azimuth<D> azimuth;
+  Beckmann::Kept<D> visible;
   V xa, xb;
   V m12, m22, kappa;
   V fa, fb;  // shares of the visible slopes below xa and xb
   V area;    // i_z (C_b - C_a)
 
   template <class I>
-  HWY_INLINE Ellipse(D d, const I& i) : w(d, i) {
-    const V one = Set(d, 1.0f), half = Set(d, 0.5f);
-    const V ex = w.ex, ey = w.ey;
+  HWY_INLINE Ellipse(D d, const I& i) : horizontal(Sqrt(i.a)), azimuth(d, i.wx, i.wy, horizontal) {
+    const V one = Set(d, 1.0f);
+    const V ex = azimuth.ex, ey = azimuth.ey;
     const V ax2 = i.ax * i.ax, ay2 = i.ay * i.ay;
     // Lanes behind compute with i = n.
     const V z = Select(i.front, Max(i.wz, Set(d, kTiny)), one);
-    const V slope = Min(Sqrt(i.a) / z, Set(d, 1e12f));  // T
-    k = Min(one / Max(slope, Set(d, 1e-7f)), Set(d, 1e7f));
+    const V slope = Min(horizontal / z, Set(d, 1e12f));  // T
     m12 = (ay2 - ax2) * ex * ey;
     m22 = Fma(ax2, ey * ey, ay2 * (ex * ex));
     kappa = ax2 * ay2 / m22;
@@ -42,20 +42,12 @@ struct Ellipse {
     xb = one / sum;
     xa = Neg(sum) / kappa;
     V erfcx, tail;
+    const V k = Min(one / Max(slope, Set(d, 1e-7f)), Set(d, 1e7f));
     ErfcxAndTail(d, k, erfcx, tail);
-    const V total = Fma(half * Gauss(d, k), tail, k);
-    const V inverse_total = one / total;
-    fa = VisibleShare(d, xa, inverse_total);
-    fb = VisibleShare(d, xb, inverse_total);
-    area = z * (fb - fa) * (total / k);
-  }
-  HWY_INLINE V VisibleShare(D d, V x, V inverse_total) const {
-    const V half = Set(d, 0.5f);
-    V e, r;
-    ErfcxAndTail(d, Abs(x), e, r);
-    const V gauss = half * Gauss(d, x), te = (k - x) * e;
-    const V share = Select(x > Zero(d), NegFma(gauss, te - r, k), gauss * (r + te));
-    return share * inverse_total;
+    visible = Beckmann::Kept<D>(d, k, erfcx, tail);
+    fa = visible.ShareBelow(d, xa);
+    fb = visible.ShareBelow(d, xb);
+    area = z * (fb - fa) * (visible.total / k);
   }
   // The chord at x.
   HWY_INLINE void Chord(D d, V x, V& from, V& to) const {
@@ -97,7 +89,16 @@ struct NormalInterval {
     const V one = Set(d, 1.0f);
     // The share below y, of all and of that below `to`.
     const V p = NegFma(one - u, share, below_to);
-    const V near = NormalSlope(d, p, one - p);
+    V drawn = NormalSlope(d, p, one - p);
+    const auto tail = to < Set(d, -3.0f);
+    if (!AllFalse(d, tail)) drawn = Select(tail, Neg(DrawTail(d, p)), drawn);
+    return Xor(Min(Max(drawn, from), to), flip);
+  }
+
+ private:
+  // -y where all is in the tail.
+  HWY_NOINLINE V DrawTail(D d, V p) const {
+    const V one = Set(d, 1.0f);
     const V l = Neg(Log(d, Min(Max(p / below_to, Set(d, 0x1p-40f)), one)));
     const V b = Abs(to);
     V e_to, e, unused;
@@ -109,8 +110,7 @@ struct NormalInterval {
       const V h = Fma(y - b, y + b, Neg(l)) - Log(d, e / e_to);
       y = Max(y - h * (e * Set(d, 0.5f / kInverseRootPi)), b);
     }
-    const V drawn = Select(to < Set(d, -3.0f), Neg(y), near);
-    return Xor(Min(Max(drawn, from), to), flip);
+    return y;
   }
 };
 
@@ -132,7 +132,7 @@ struct BeckmannExact : SamplerTraits {
     const Ellipse<D> ellipse(d, i);
     const V inverse = Set(d, -1.0f) / Max(mz, Set(d, kHorizon));
     const V sx = mx * inverse / i.ax, sy = my * inverse / i.ay;
-    const V x = Fma(sx, ellipse.w.ex, sy * ellipse.w.ey);
+    const V x = Fma(sx, ellipse.azimuth.ex, sy * ellipse.azimuth.ey);
     V from, to;
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);
@@ -146,15 +146,15 @@ struct BeckmannExact : SamplerTraits {
     const Ellipse<D> ellipse(d, i);
     V x, t, from, to;
     const V u = Fma(u1, ellipse.fb - ellipse.fa, ellipse.fa);
-    Beckmann::VisibleSlope(d, ellipse.k, Min(u, Set(d, kLargestBelowOne)), x, t);
+    Beckmann::FrontSlope(d, ellipse.visible, Min(u, Set(d, kLargestBelowOne)), x, t);
     x = Min(Max(x, ellipse.xa), ellipse.xb);
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);
     const V y = interval.Draw(d, u2);
     V sx, sy;
-    ellipse.w.Turn(x, y, sx, sy);
+    ellipse.azimuth.Turn(x, y, sx, sy);
     FromSlope(d, i, sx, sy, drawn);
-    drawn.im = Max(i.nu * NegFma(ellipse.w.s, x, ellipse.w.c), Set(d, kSmallestIm));
+    drawn.im = Max(NegFma(ellipse.horizontal, x, i.wz), Set(d, kSmallestIm));
     drawn.two_n = Max((ellipse.area + ellipse.area) * interval.share, Set(d, 1e-37f));
     drawn.shift = interval.shift;
     if (!i.all_front) {

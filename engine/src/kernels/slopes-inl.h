@@ -76,17 +76,17 @@ struct SlopeNdf : SamplerTraits, SlopeNormals {
   }
 };
 
-// Visible normals by the distribution's DrawVisible(d, i, c, s, u1, u2, x, y, gap), with x along the azimuth and
-// gap = c - s x.
+// Visible normals by the distribution's DrawVisible(d, i, horizontal, u1, u2, x, y, im), with x along the azimuth and
+// im = w_z - horizontal x, horizontal the length of (w_x, w_y).
 struct SlopeVisible : SlopeNormals, VisibleNormals {
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
-    const Incidence<D> w(d, i);
-    V along, across, gap, x, y;
-    I::Distribution::DrawVisible(d, i, w.c, w.s, u1, u2, along, across, gap);
-    w.Turn(along, across, x, y);
+    const V horizontal = Sqrt(i.a);
+    V along, across, im, x, y;
+    I::Distribution::DrawVisible(d, i, horizontal, u1, u2, along, across, im);
+    Azimuth<D>(d, i.wx, i.wy, horizontal).Turn(along, across, x, y);
     FromSlope(d, i, x, y, drawn);
-    drawn.im = Max(i.nu * gap, Set(d, kSmallestIm));
+    drawn.im = Max(im, Set(d, kSmallestIm));
     drawn.two_n = i.two_normaliser;
   }
 };

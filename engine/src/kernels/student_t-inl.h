@@ -27,11 +27,17 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     const V larger = nu + Abs(z);
     return Select(z > Zero(d), larger, a2 / larger);
   }
-  template <class D, class I, class V = Vec<D>>
+  template <class D>
+  struct Kept {
+    Vec<D> nu, sum;  // of w, as Sum() gives them
+    HWY_INLINE Kept() {}
+    template <class I>
+    HWY_INLINE Kept(D d, const I& i) : sum(Sum(d, i.wz, i.a, nu)) {}
+  };
+  template <class D, class I>
   static HWY_INLINE void Area(D d, I& i) {
-    V nu;
-    const V sum = Sum(d, i.wz, i.a, nu);
-    i.two_sigma = sum * sum / (nu + nu);
+    i.kept = Kept<D>(d, i);
+    i.two_sigma = i.kept.sum * i.kept.sum / (i.kept.nu + i.kept.nu);
   }
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void BiasedArea(D d, I& i) {
@@ -77,22 +83,25 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   // In the frame stretched by sqrt(2) alpha, x = (t - 1/t) / 2; x's largest value has t = T = (1 + c) / s. The share
   // below t = T z is
   //   F(z) = z^3 ((T^2 - 1) z (3 + T^2 z^2) + 4) (1 + T^2) / (1 + T^2 z^2)^3,
-  // solved by three Halley steps: error of F 6e-7. They start from the solutions for T = 1 and T = infinity in
-  // q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's share is that of a fixed
-  // density.
+  // solved by two steps of Householder's third order: error of F 1e-9, and of float 6e-7. They start from the solutions
+  // for T = 1 and T = infinity in q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's
+  // share is that of a fixed density.
   template <class D, class I, class V = Vec<D>>
-  static HWY_NOINLINE void DrawVisible(D d, const I& i, V c_i, V s_i, V u1, V u2, V& x, V& y, V& gap) {
-    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f);
-    V nu;
-    const V sum = Sum(d, i.wz, i.a, nu);
-    const V s_nu = Sqrt(Max(i.a + i.a, Set(d, kSmallestA)));
+  static HWY_INLINE void DrawVisible(D d, const I& i, V horizontal, V u1, V u2, V& x, V& y, V& im) {
+    DrawVisible(d, i.kept, i.wz, horizontal, u1, u2, x, y, im);
+  }
+  template <class D, class V = Vec<D>>
+  static HWY_NOINLINE void DrawVisible(D d, const Kept<D>& kept, V wz, V horizontal, V u1, V u2, V& x, V& y, V& im) {
+    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f), quarter = Set(d, 0.25f),
+            root2 = Set(d, kRoot2);
+    const V sum = kept.sum, nu = kept.nu;
     // Within 2^-13 of straight down it makes no difference.
-    const V t_max = Min(sum / s_nu, Set(d, 0x1p13f));
+    const V t_max = Min(sum / (root2 * Max(horizontal, Set(d, kSmallestHorizontal))), Set(d, 0x1p13f));
     const V t2 = t_max * t_max;
     const V one_t2 = one + t2;
 
     const V u = Max(u1, Set(d, 0x1p-26f)), rest = one - u;
-    const V inverse_root = InverseCubeRoot(d, u);
+    const V inverse_root = RoughInverseCubeRoot(d, u);
     const V s1 = u * inverse_root * inverse_root;  // cube root
     const V q1 = Sqrt(Max(NegFma(s1, s1, one), zero));
     const V low = Min(u, rest) * Set(d, 4.0f);
@@ -104,32 +113,34 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     const V onep = Fma(c, to - from, from);
     V z = onep / (Sqrt(onep * (Set(d, 2.0f) - onep)) * Max(t_max, one));
     z = Min(z, Set(d, 1.0f - 0x1p-12f));
-    for (int step = 0; step < 3; ++step) {
-      const V zz = z * z, b = Fma(t2, zz, one);
-      const V inverse_b = one / b;
-      const V inverse_b3 = inverse_b * inverse_b * inverse_b;
-      const V scale = one_t2 * inverse_b3;
-      const V linear = Fma(t2, z, one);
-      const V f = zz * z * Fma((t2 - one) * z, Fma(t2, zz, three), Set(d, 4.0f)) * scale - u;
-      const V gone = one - z;
-      // F' = 12 z^2 (1 - z)(T^2 z + 1)(1 + T^2) / b^4; half of (log F')' times F'.
-      const V f1 = Set(d, 12.0f) * zz * gone * linear * scale * inverse_b;
-      const V ratio = f / f1;
-      const V bend = one / z - half / gone + half * t2 / linear - Set(d, 4.0f) * t2 * z * inverse_b;
-      const V next = z - ratio / Max(NegFma(ratio, bend, one), Set(d, 0.25f));
-      z = Min(Max(next, z * Set(d, 0.25f)), Set(d, kLargestBelowOne));
+    for (int step = 0; step < 2; ++step) {
+      const V zz = z * z, t2z = t2 * z;
+      const V inverse_b = one / Fma(t2, zz, one);
+      const V scale = one_t2 * (inverse_b * inverse_b * inverse_b);
+      const V f = NegFma(zz * z * Fma((t2 - one) * z, Fma(t2z, z, three), Set(d, 4.0f)), scale, u);
+      // F' = 12 z w (1 + T^2) / b^4 with w = z (1 - z)(T^2 z + 1). The first and second derivative of log F', times w
+      // and w^2: `bend`, `bend2`.
+      const V gone = one - z, linear = t2z + one;
+      const V a0 = gone * linear, a1 = z * linear, a2 = t2z * gone, w = z * a0;
+      const V slope = Set(d, 12.0f) * w * w * z * (scale * inverse_b);  // F' w
+      const V inner = Set(d, 8.0f) * t2 * inverse_b * w;
+      const V bend = NegFma(inner, z, a0 + a0 - a1 + a2);
+      const V bend2 =
+          Fma(inner * w, Fma(t2z * z, inverse_b + inverse_b, Neg(one)), Neg(Fma(a0 + a0, a0, Fma(a1, a1, a2 * a2))));
+      const V slope2 = slope * slope;
+      const V third = Fma(bend, bend, bend2) * Set(d, 1.0f / 6.0f);
+      const V denominator = Fma(f * f, third, Fma(bend * slope, f, slope2));
+      const V change = w * f * Fma(half * bend, f, slope) / Max(denominator, Set(d, 0.2f) * slope2);
+      // Where rounding decides how near to 1 it is, one step does not go so near that the next cannot come back.
+      z = Min(Max(z + change, z * quarter), NegFma(quarter, gone, one));
     }
-    const V t = t_max * z;
-    const V scaled = half * (t - one / t);
-    const V gone = one - z;
-    // gap = (1 - z)(T^2 z + 1) / (z (1 + T^2)) of the stretched frame, whose nu is larger than w's.
-    gap = gone * Fma(t2, z, one) / (z * one_t2) * (nu / i.nu);
-    const V root2 = Set(d, 1.41421356f);
-    x = root2 * scaled;
-    // Near straight down, where T is not w's, by the slope.
-    gap = Select(t_max > Set(d, 64.0f), Max(NegFma(s_i, x, c_i), zero), gap);
+    const V t = t_max * z, inverse_t = one / t;
+    x = root2 * half * (t - inverse_t);
+    // w_z - horizontal x = nu (1 - z)(T^2 z + 1) / (z (1 + T^2)); near straight down, where T is not w's, by the slope.
+    im = nu * ((one - z) * Fma(t2, z, one)) / (z * one_t2);
+    im = Select(t_max > Set(d, 64.0f), Max(NegFma(horizontal, x, wz), zero), im);
     // y = sqrt(1 + x^2) times a number with density ~ (1 + y^2)^-3.
-    y = root2 * (half * (t + one / t)) * Conditional(d, u2);
+    y = root2 * half * (t + inverse_t) * Conditional(d, u2);
   }
 
   // V-cavity behind. With k = |i_z| / sqrt(A), n(k)^2 = 2 + k^2 and sigma(-i) / sqrt(A) = 1 / D(k), D(k) = n (n + k)^2,
@@ -167,17 +178,18 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     }
     const V q = q3 * Min(z, one);
     // x = -sqrt(2) s / sqrt(1 - s^2), s = 1 - q
-    const V root2 = Set(d, 1.41421356f);
+    const V root2 = Set(d, kRoot2);
     const V wide = one / Sqrt(q * (two - q));  // sqrt(1 + x^2 / 2)
     const V first_x = Neg(Max(root2 * (one - q) * wide, three * at.k));
     const V first_y = root2 * wide * Conditional(d, u2);
     // Second: of all visible slopes those above -3 k: shares above that at -3 k, D(k) (1 / D(3 k) + 2 k beyond).
     const V at3 = at.d1 * Fma(two * at.k, beyond, one / at.d3);
     const V u = Min(Fma(u1, one - at3, at3), Set(d, kLargestBelowOne));
-    const V inverse_nu = one / i.nu;
-    V second_x, second_y, gap;
-    DrawVisible(d, i, i.wz * inverse_nu, at.root * inverse_nu, u, u2, second_x, second_y, gap);
-    const V second_im = Min(i.nu * gap, two * Abs(i.z));
+    V second_x, second_y, second_im;
+    DrawVisible(d, Kept<D>(d, i), i.wz, at.root, u, u2, second_x, second_y, second_im);
+    // Rounding may put it beyond -3 k.
+    second_x = Max(second_x, Neg(three * at.k));
+    second_im = Min(second_im, two * Abs(i.z));
 
     Azimuth<D>(d, i.wx, i.wy, at.root, i.a < Set(d, kSmallestA))
         .Turn(Select(first, first_x, second_x), Select(first, first_y, second_y), x, y);
@@ -185,6 +197,7 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   }
 
  private:
+  static constexpr float kRoot2 = 1.41421356f;
   // k, n and D at k and 3 k; sqrt(A).
   template <class D>
   struct Behind {
@@ -208,7 +221,8 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   template <class D, class V = Vec<D>>
   static HWY_INLINE V Conditional(D d, V u) {
     const V low = Max(u, Set(d, 0x1p-26f)), high = Set(d, 1.0f) - u;
-    const V k = Set(d, 1.0f) / InverseFifthRoot(d, Set(d, 4.0f) * (low * high));
+    const V of_low = InverseFifthRoot(d, low), of_high = InverseFifthRoot(d, high);
+    const V k = Set(d, 1.31950791f) / (of_low * of_high);  // times 4^(1/5)
     V p = Set(d, -0.0154215065f);
     p = Fma(p, k, Set(d, 0.057050321f));
     p = Fma(p, k, Set(d, -0.0578400181f));
@@ -217,7 +231,7 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     p = Fma(p, k, Set(d, 0.0521361166f));
     p = Fma(p, k, Set(d, 0.531557542f));
     p = Fma(p, k, Set(d, 0.701406545f));
-    return p * (InverseFifthRoot(d, high) - InverseFifthRoot(d, low));
+    return p * (of_high - of_low);
   }
 };
 

@@ -33,7 +33,7 @@ inline constexpr float kVertical = 1e-15f;   // a shorter (x, y) has no azimuth
 
 // Where w is straight below no normal is visible and sigma is 0. Behind the surface A is taken as this at least,
 // as if w were tilted by 3e-8, so that densities stay finite.
-inline constexpr float kSmallestA = 0x1p-50f;
+inline constexpr float kSmallestA = 0x1p-50f, kSmallestHorizontal = 0x1p-25f;  // its root
 
 // What a distribution is unless it says otherwise.
 struct DistributionTraits {
@@ -43,6 +43,9 @@ struct DistributionTraits {
   static constexpr bool kLongChains = false;          // sampling gains from pairs of vectors
   static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
   static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
+  // What Area() leaves to a sampler.
+  template <class D>
+  struct Kept {};
 };
 
 // Distribution: a policy as described in docs/adding.md.
@@ -74,6 +77,7 @@ struct Incident {
   Mask<D> ahead;     // w_z > 0
   bool all_front;    // both, in all lanes
   const SlopeTableView* table;
+  typename Distribution::template Kept<D> kept;
 };
 
 template <class S, class D, class V = Vec<D>>

@@ -80,7 +80,7 @@ HWY_INLINE V ShareBelow(D d, V x) {
 // digits. With y = 1 - 2 u and w = -log(1 - y^2), x / y is smooth in w and, in the tail, in its root (Giles 2010).
 // Error of the share 2e-7, relative 1.5e-4 in the tails down to 1e-18; beyond, x is finite.
 template <class D, class V = Vec<D>>
-HWY_NOINLINE V NormalSlope(D d, V u, V rest) {
+HWY_INLINE V NormalSlope(D d, V u, V rest) {
   const V low = Max(Min(u, rest), Set(d, 1e-18f));
   const V y = NegFma(Set(d, 2.0f), low, Set(d, 1.0f));
   const V w = Neg(Log(d, Set(d, 4.0f) * NegFma(low, low, low)));
