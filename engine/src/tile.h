@@ -26,9 +26,9 @@ inline constexpr unsigned kWantsNormal = bit(kOutMx) | bit(kOutMy) | bit(kOutMz)
 inline constexpr unsigned kWantsPdf = bit(kOutPdf), kWantsWeight = bit(kOutWeight), kWantsValue = bit(kOutValue),
                           kWantsShare = bit(kOutShare);
 
-// The most lanes that a kernel takes at once: two of the widest vectors. Every buffer of a tile may be read and
+// The most lanes that a kernel takes at once: four of the widest vectors. Every buffer of a tile may be read and
 // written up to the next multiple of it.
-inline constexpr std::size_t kWidest = 32;
+inline constexpr std::size_t kWidest = 64;
 
 // What the kernels of Kelemen's lobe pass on (kernels/kelemen-inl.h).
 enum LobeColumn {

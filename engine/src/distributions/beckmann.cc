@@ -12,19 +12,19 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class Pairs>
+template <class D>
 constexpr DistributionKernels MakeBeckmann() {
   DistributionKernels kernels;
-  kernels.smith = Registrar<Surface<Beckmann, Smith, false>, D, Pairs>()
+  kernels.smith = Registrar<Surface<Beckmann, Smith, false>, D>()
                       .template Add<SlopeNdf>(Sampler::ndf)
                       .template Add<SlopeVisible>(Sampler::visible)
                       .template Add<BeckmannExact>(Sampler::exact)
                       .kernels;
-  kernels.smith_affine = Registrar<Surface<Beckmann, Smith, true>, D, Pairs>()
+  kernels.smith_affine = Registrar<Surface<Beckmann, Smith, true>, D>()
                              .template Add<SlopeNdf>(Sampler::ndf)
                              .template Add<SlopeVisible>(Sampler::visible)
                              .kernels;
-  kernels.vcavity = Registrar<Surface<Beckmann, VCavity, false>, D, Pairs>()
+  kernels.vcavity = Registrar<Surface<Beckmann, VCavity, false>, D>()
                         .template Add<SlopeNdf>(Sampler::ndf)
                         .template Add<CavityVisible>(Sampler::visible)
                         .template Add<CavityExact>(Sampler::exact)

@@ -12,10 +12,10 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class Pairs>
+template <class D>
 constexpr DistributionKernels MakeGgx() {
   DistributionKernels kernels;
-  kernels.smith = Registrar<Surface<Ggx, Smith, false>, D, Pairs>()
+  kernels.smith = Registrar<Surface<Ggx, Smith, false>, D>()
                       .template Add<GgxNdf>(Sampler::ndf)
                       .template Add<Heitz, Cap>(Sampler::heitz)
                       .template Add<Cap>(Sampler::cap)
@@ -23,7 +23,7 @@ constexpr DistributionKernels MakeGgx() {
                       .template Add<Bounded>(Sampler::bounded)
                       .template Add<GgxExact>(Sampler::exact)
                       .kernels;
-  kernels.smith_affine = Registrar<Surface<Ggx, Smith, true>, D, Pairs>()
+  kernels.smith_affine = Registrar<Surface<Ggx, Smith, true>, D>()
                              .template Add<GgxNdf>(Sampler::ndf)
                              .template Add<Heitz, Cap>(Sampler::heitz)
                              .template Add<Cap>(Sampler::cap)

@@ -10,10 +10,10 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class Pairs>
+template <class D>
 constexpr DistributionKernels MakePhong() {
   DistributionKernels kernels;
-  kernels.vcavity = Registrar<Surface<Phong, VCavity, false>, D, Pairs>()
+  kernels.vcavity = Registrar<Surface<Phong, VCavity, false>, D>()
                         .template Add<SlopeNdf>(Sampler::ndf)
                         .template Add<PhongCavity>(Sampler::visible)
                         .kernels;

@@ -12,14 +12,14 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class Pairs>
+template <class D>
 constexpr DistributionKernels MakeStudentT() {
   DistributionKernels kernels;
-  kernels.smith = Registrar<Surface<StudentT, Smith, false>, D, Pairs>()
+  kernels.smith = Registrar<Surface<StudentT, Smith, false>, D>()
                       .template Add<SlopeNdf>(Sampler::ndf)
                       .template Add<SlopeVisible>(Sampler::visible)
                       .kernels;
-  kernels.vcavity = Registrar<Surface<StudentT, VCavity, false>, D, Pairs>()
+  kernels.vcavity = Registrar<Surface<StudentT, VCavity, false>, D>()
                         .template Add<SlopeNdf>(Sampler::ndf)
                         .template Add<CavityVisible>(Sampler::visible)
                         .template Add<CavityExact>(Sampler::exact)

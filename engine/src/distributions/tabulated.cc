@@ -12,7 +12,7 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-template <class D, class>
+template <class D>
 constexpr DistributionKernels MakeTabulated() {
   DistributionKernels kernels;
   // A table has a mean slope of its own.

@@ -19,6 +19,7 @@ inline constexpr float kSmallestZ = 0x1p-62f;
 
 // Normals with density D(m) m_z (Walter 2007, Eqs. 35, 36): p(o) = D(m) m_z / (4 |i.m|).
 struct GgxNdf : SamplerTraits, UnitNormals {
+  static constexpr bool kReadsArea = false;
   static constexpr bool kVisible = false;
   static constexpr bool kShifted = false;
 

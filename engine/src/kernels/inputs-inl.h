@@ -60,16 +60,16 @@ struct Inputs {
     return Classify(d, valid, ax, ay, kLargestRoughness);
   }
 
-  template <bool kFast>
+  template <bool kReadsArea = true, bool kFast>
   HWY_INLINE Incident<D, S> Prepared(D d, const Tile& tile, const Exceptions<D, kFast>& exceptions) const {
     V means[2] = {};
     if constexpr (S::kAffine) {
       means[0] = exceptions.Computable(mean_x, 0.0f);
       means[1] = exceptions.Computable(mean_y, 0.0f);
     }
-    return Prepare<S>(d, tile, exceptions.Computable(x, 0.0f), exceptions.Computable(y, 0.0f),
-                      exceptions.Computable(z, 1.0f), exceptions.Computable(ax, 1.0f), exceptions.Computable(ay, 1.0f),
-                      means[0], means[1]);
+    return Prepare<S, kReadsArea>(d, tile, exceptions.Computable(x, 0.0f), exceptions.Computable(y, 0.0f),
+                                  exceptions.Computable(z, 1.0f), exceptions.Computable(ax, 1.0f),
+                                  exceptions.Computable(ay, 1.0f), means[0], means[1]);
   }
 
   // A direction's x and y as loaded, and as stored.

@@ -16,10 +16,9 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// A surface's kernels for vectors D, one sampler after the other. Pairs: the tag for samplers with a long chain, which
-// gain by 15 % from pairs, and for all sampling where the distribution's areas are long; the others lose up to 9 % by
-// them where registers are few.
-template <class S, class D, class Pairs = D>
+// A surface's kernels for vectors D, one sampler after the other. Samplers with a long chain take four vectors at a time
+// (docs/numerics.md).
+template <class S, class D>
 struct Registrar {
   SurfaceKernels kernels{};
 
@@ -33,10 +32,10 @@ struct Registrar {
   template <class Drawer>
   constexpr Registrar& Add(Sampler sampler) {
     const auto index = static_cast<std::size_t>(sampler);
-    using T = std::conditional_t<Drawer::kExact || S::Distribution::kLongChains, Pairs, D>;
+    using T = std::conditional_t<Drawer::kExact || S::Distribution::kLongChains, Four<D>, D>;
     kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
     if constexpr (S::Distribution::kWaitsForMemory && kStreams<D>)
-      kernels.sample_ahead[index] = ForEachVector<Pairs, Sample<Pairs, S, Drawer>, true>;
+      kernels.sample_ahead[index] = ForEachVector<Two<D>, Sample<Two<D>, S, Drawer>, true>;
     kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
     if constexpr (Drawer::kNormals) {
       kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;
@@ -60,19 +59,19 @@ struct Registrar {
 }  // namespace facetwise
 HWY_AFTER_NAMESPACE();
 
-// Defines k<Name> and, where there is one, kOneLane<Name> from a template Make<Name><D, Pairs>() that gives
+// Defines k<Name> and, where there is one, kOneLane<Name> from a template Make<Name><D>() that gives
 // DistributionKernels.
 #undef FACETWISE_REGISTER
 #if FACETWISE_HAS_ONE_LANE
-#define FACETWISE_REGISTER(Name)                                     \
-  extern const DistributionKernels k##Name;                          \
-  extern const DistributionKernels kOneLane##Name;                   \
-  const DistributionKernels k##Name = Make##Name<Full, FullPairs>(); \
-  const DistributionKernels kOneLane##Name = Make##Name<Single, Single>();
+#define FACETWISE_REGISTER(Name)                          \
+  extern const DistributionKernels k##Name;               \
+  extern const DistributionKernels kOneLane##Name;        \
+  const DistributionKernels k##Name = Make##Name<Full>(); \
+  const DistributionKernels kOneLane##Name = Make##Name<Single>();
 #else
 #define FACETWISE_REGISTER(Name)            \
   extern const DistributionKernels k##Name; \
-  const DistributionKernels k##Name = Make##Name<Full, FullPairs>();
+  const DistributionKernels k##Name = Make##Name<Full>();
 #endif
 
 #endif

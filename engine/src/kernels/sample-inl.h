@@ -33,7 +33,7 @@ struct Sample {
     const V zero = Zero(d), one = Set(d, 1.0f);
     const auto exceptions = ExceptionsOf<kFast>(d, tile, lane, in);
     const InterfaceInputs<D> interface(d, tile, lane);
-    const Incident<D, S> i = in.Prepared(d, tile, exceptions);
+    const Incident<D, S> i = in.template Prepared<Drawer::kReadsArea>(d, tile, exceptions);
 
     Drawn<D> drawn;
     V u3 = exceptions.Computable(in.u3, 0.0f);
@@ -73,6 +73,7 @@ struct Sample {
     if (!tile.normals_alone) {
       if (tile.wanted & kWantsWeight) {
         V weight = S::Masking::template Weight<Drawer>(d, i, drawn, ox, oy, oz, tile.uncorrelated);
+        if constexpr (Drawer::kUnboundedWeight) weight = Min(weight, Set(d, kLargestDensity));
         V mirror = one;
         if (fresnel) {
           weight = weight * interface.Reflectance(d, tile, im);

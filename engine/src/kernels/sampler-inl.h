@@ -84,13 +84,15 @@ struct HalfVectors {
 
 // What a sampler is unless it says otherwise.
 struct SamplerTraits {
-  static constexpr bool kVisible = true;    // i.m > 0 always
-  static constexpr bool kUsesU3 = false;    // u3 is read
-  static constexpr bool kNIsSigma = false;  // N = sigma(i)
-  static constexpr bool kShifted = true;    // N is times exp(shift), as sigma is (surface-inl.h)
-  static constexpr bool kOwnShift = false;  // N is times e^(shift) of the sample's own
-  static constexpr bool kExact = false;     // for i_z > 0 no reflection is occluded; o_z is raised to kRim
-  static constexpr bool kNormals = true;    // serves normals and transmission too, not only reflections
+  static constexpr bool kVisible = true;           // i.m > 0 always
+  static constexpr bool kUsesU3 = false;           // u3 is read
+  static constexpr bool kNIsSigma = false;         // N = sigma(i)
+  static constexpr bool kShifted = true;           // N is times exp(shift), as sigma is (surface-inl.h)
+  static constexpr bool kOwnShift = false;         // N is times e^(shift) of the sample's own
+  static constexpr bool kExact = false;            // for i_z > 0 no reflection is occluded; o_z is raised to kRim
+  static constexpr bool kReadsArea = true;         // sigma(i) is read in front, also where no weight is wanted
+  static constexpr bool kUnboundedWeight = false;  // what a file says decides how large it is
+  static constexpr bool kNormals = true;           // serves normals and transmission too, not only reflections
 };
 
 // What samplers of all visible normals share: N = sigma(i).

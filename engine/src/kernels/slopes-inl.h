@@ -54,6 +54,7 @@ struct SlopeNormals {
 
 // Normals with density D(m) m_z, by DrawSlope(d, i, u1, u2, x, y).
 struct SlopeNdf : SamplerTraits, SlopeNormals {
+  static constexpr bool kReadsArea = false;
   static constexpr bool kVisible = false;
   static constexpr bool kShifted = false;
 

@@ -98,7 +98,7 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     // Within 2^-13 of straight down it makes no difference.
     const V t_max = Min(sum / (root2 * Max(horizontal, Set(d, kSmallestHorizontal))), Set(d, 0x1p13f));
     const V t2 = t_max * t_max;
-    const V one_t2 = one + t2;
+    const V one_t2 = one + t2, inverse_one_t2 = one / one_t2;
 
     const V u = Max(u1, Set(d, 0x1p-26f)), rest = one - u;
     const V inverse_root = RoughInverseCubeRoot(d, u);
@@ -109,7 +109,7 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     const auto lower = u < half;
     // 1 + q for T = 1 and T = infinity
     const V from = s1 * s1 / (one + q1), to = Select(lower, end, Set(d, 2.0f) - end);
-    const V c = Max((t2 - one) / one_t2, zero);
+    const V c = Max((t2 - one) * inverse_one_t2, zero);
     const V onep = Fma(c, to - from, from);
     V z = onep / (Sqrt(onep * (Set(d, 2.0f) - onep)) * Max(t_max, one));
     z = Min(z, Set(d, 1.0f - 0x1p-12f));
@@ -137,7 +137,7 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     const V t = t_max * z, inverse_t = one / t;
     x = root2 * half * (t - inverse_t);
     // w_z - horizontal x = nu (1 - z)(T^2 z + 1) / (z (1 + T^2)); near straight down, where T is not w's, by the slope.
-    im = nu * ((one - z) * Fma(t2, z, one)) / (z * one_t2);
+    im = nu * ((one - z) * Fma(t2, z, one)) * (t_max * inverse_t * inverse_one_t2);
     im = Select(t_max > Set(d, 64.0f), Max(NegFma(horizontal, x, wz), zero), im);
     // y = sqrt(1 + x^2) times a number with density ~ (1 + y^2)^-3.
     y = root2 * half * (t + inverse_t) * Conditional(d, u2);

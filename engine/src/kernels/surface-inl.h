@@ -40,7 +40,7 @@ struct DistributionTraits {
   static constexpr float kLargestRoughness = kLargestAlpha;
   static constexpr bool kShifts = false;              // densities and areas are kept times e^(shift)
   static constexpr bool kWaitsForMemory = false;      // so quick that large calls wait for their columns
-  static constexpr bool kLongChains = false;          // sampling gains from pairs of vectors
+  static constexpr bool kLongChains = false;          // sampling gains from several vectors at a time
   static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
   static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
   // What Area() leaves to a sampler.
@@ -80,7 +80,8 @@ struct Incident {
   typename Distribution::template Kept<D> kept;
 };
 
-template <class S, class D, class V = Vec<D>>
+// Unless kReadsArea the area is left out in front where nobody wants a weight.
+template <class S, bool kReadsArea, class D, class V = Vec<D>>
 HWY_INLINE Incident<D, S> Prepare(D d, const Tile& tile, V x, V y, V z, V ax, V ay, V mean_x, V mean_y) {
   Incident<D, S> i;
   i.x = x;
@@ -100,13 +101,20 @@ HWY_INLINE Incident<D, S> Prepare(D d, const Tile& tile, V x, V y, V z, V ax, V 
     i.ahead = i.wz > Zero(d);
   }
   i.a = Fma(i.wx, i.wx, i.wy * i.wy);
-  i.nu = Sqrt(Fma(i.wz, i.wz, i.a));
   if constexpr (S::kAffine) {
     i.all_front = AllTrue(d, And(i.front, i.ahead));
   } else {
     i.all_front = AllTrue(d, i.front);
   }
   i.table = tile.table;
+  if constexpr (!kReadsArea) {
+    if (i.all_front && !(tile.wanted & kWantsWeight)) {
+      i.nu = i.two_sigma = i.two_normaliser = Set(d, 1.0f);
+      i.shift = i.area_shift = Zero(d);
+      return i;
+    }
+  }
+  i.nu = Sqrt(Fma(i.wz, i.wz, i.a));
   S::Masking::Area(d, i);
   i.two_normaliser = i.two_sigma;
   if (!i.all_front && tile.biased) S::Masking::BiasedArea(d, i);

@@ -115,6 +115,7 @@ struct Tabulated : DistributionTraits {
 template <class Drawer>
 struct TableNormals : SamplerTraits {
   static constexpr bool kUnit = true;
+  static constexpr bool kUnboundedWeight = true;
 
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Density(D d, const I& i, const Drawn<D>& drawn, V, V& numerator, V& denominator) {
@@ -145,6 +146,7 @@ struct TableNormals : SamplerTraits {
 };
 
 struct TableNdf : TableNormals<TableNdf> {
+  static constexpr bool kReadsArea = false;
   static constexpr bool kVisible = false;
 
   template <class D, class I, class V = Vec<D>>
@@ -162,6 +164,7 @@ struct TableNdf : TableNormals<TableNdf> {
 };
 
 struct TableVisible : TableNormals<TableVisible> {
+  static constexpr bool kReadsArea = false;
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE V DrawingDensity(D d, const I& i, V mx, V my, V mz) {
     V c, s, ex, ey, nu;

@@ -1,13 +1,13 @@
 // The vector operations that kernels are made of. Only operations with one IEEE result are used (+ - * / sqrt,
 // fused multiply-add, comparisons, selects, integers), so that every target gives the same bits.
 //
-// Kernels are templates over a tag D: one of Highway's, or Twice<D>, two neighbouring vectors. They call
+// Kernels are templates over a tag D: one of Highway's, or Twice<D>, two neighbouring ones, which may be pairs too. They call
 // operations without a namespace, so that argument-dependent lookup finds Highway's for its vectors and those
 // below for pairs. Fma and the like are fused; * and + are not.
 //
 // Why pairs: a kernel is one long chain of roots and divisions, and the processor's scheduler is full of one
-// vector's waiting instructions before it reaches the next vector. With two vectors' instructions side by side
-// both chains advance together.
+// vector's waiting instructions before it reaches the next vector. With several vectors' instructions side by side
+// their chains advance together.
 
 #if defined(FACETWISE_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef FACETWISE_LANES_INL_H_
@@ -50,20 +50,23 @@ struct TagTraits {
 };
 template <class D>
 struct TagTraits<Twice<D>> {
-  using V = Pair<hn::Vec<D>>;
-  using M = Pair<hn::Mask<D>>;
+  using V = Pair<typename TagTraits<D>::V>;
+  using M = Pair<typename TagTraits<D>::M>;
   template <class T>
-  using Rebound = Twice<hn::Rebind<T, D>>;
+  using Rebound = Twice<typename TagTraits<D>::template Rebound<T>>;
 };
 
 // AVX-512 has AVX2's scalar instructions, so that kernels one lane wide are compiled once for both.
 #undef FACETWISE_HAS_ONE_LANE
 #define FACETWISE_HAS_ONE_LANE (HWY_TARGET != HWY_AVX3)
 
-// Where vectors have one lane, pairs are not worth their compilation.
 using Full = hn::ScalableTag<float>;
 using Single = hn::CappedTag<float, 1>;
-using FullPairs = std::conditional_t<HWY_TARGET == HWY_SCALAR, Full, Twice<Full>>;
+// Side by side; not where vectors have one lane, which is slow anyhow.
+template <class D>
+using Two = std::conditional_t<hn::MaxLanes(D()) == 1, D, Twice<D>>;
+template <class D>
+using Four = std::conditional_t<hn::MaxLanes(D()) == 1, D, Twice<Twice<D>>>;
 
 // Whether there are streaming stores: on x86, where two of these vectors fill a line at the least.
 template <class D>
@@ -115,16 +118,16 @@ FACETWISE_PAIRWISE(TestBit)
 FACETWISE_PAIRWISE(IfThenElseZero)
 #undef FACETWISE_PAIRWISE
 
-template <int kBits, class V>
-HWY_INLINE Pair<V> ShiftLeft(Pair<V> x) {
-  return {hn::ShiftLeft<kBits>(x.a), hn::ShiftLeft<kBits>(x.b)};
-}
 using hn::ShiftLeft;
 template <int kBits, class V>
-HWY_INLINE Pair<V> ShiftRight(Pair<V> x) {
-  return {hn::ShiftRight<kBits>(x.a), hn::ShiftRight<kBits>(x.b)};
+HWY_INLINE Pair<V> ShiftLeft(Pair<V> x) {
+  return {ShiftLeft<kBits>(x.a), ShiftLeft<kBits>(x.b)};
 }
 using hn::ShiftRight;
+template <int kBits, class V>
+HWY_INLINE Pair<V> ShiftRight(Pair<V> x) {
+  return {ShiftRight<kBits>(x.a), ShiftRight<kBits>(x.b)};
+}
 
 // Operations with a tag.
 template <class D, class T>
