@@ -10,7 +10,9 @@
 #include <cerrno>
 #include <cstring>
 #include <deque>
+#include <filesystem>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include "app/errors.h"
@@ -160,6 +162,8 @@ class NpzInput final : public InputTable {
       zip_error_fini(&what);
       return invalid("{}: {}", path, text);
     }
+    std::error_code unknown;
+    const zip_uint64_t file_bytes = std::filesystem::file_size(path, unknown);  // the largest number where unknown
     const zip_int64_t entries = zip_get_num_entries(zip.get(), 0);
     for (zip_int64_t k = 0; k < entries; ++k) {
       zip_stat_t stat;
@@ -169,6 +173,10 @@ class NpzInput final : public InputTable {
       if (!name.ends_with(".npy")) return invalid("{}: {} in it is not a .npy file", path, name);
       constexpr zip_uint64_t kLargestArray = zip_uint64_t{1} << 34;
       if (stat.size > kLargestArray) return invalid("{}: {} in it has {} bytes, too many", path, name, stat.size);
+      // Before memory is taken for it: a file that lies about a size is small, and deflate cannot do better than this.
+      constexpr zip_uint64_t kMostExpansion = 1040;
+      if (stat.size / kMostExpansion > std::min(stat.comp_size, file_bytes))
+        return invalid("{}: {} in it announces {} bytes, more than can be in the file", path, name, stat.size);
       std::string& bytes = bytes_.emplace_back(stat.size, '\0');
       const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(zip_fopen_index(zip.get(), index, 0), zip_fclose);
       if (!file || zip_fread(file.get(), bytes.data(), bytes.size()) != static_cast<zip_int64_t>(bytes.size()))

@@ -1,4 +1,6 @@
-// Runs a fuzz target over the files of folders.
+// Runs a fuzz target over the files of folders, in no more memory than a small input may take.
+#include <sys/resource.h>
+
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +11,10 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 int main(int argc, char** argv) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const rlimit two_gib = {rlim_t{1} << 31, rlim_t{1} << 31};
+  setrlimit(RLIMIT_DATA, &two_gib);
+#endif
   int count = 0;
   for (int k = 1; k < argc; ++k)
     for (const auto& entry : std::filesystem::directory_iterator(argv[k])) {
