@@ -115,6 +115,7 @@ struct NormalInterval {
 };
 
 struct BeckmannExact : SamplerTraits {
+  static constexpr bool kLongChain = true;
   static constexpr bool kReadsArea = false;
   static constexpr bool kUnit = true;
   static constexpr bool kOwnShift = true;

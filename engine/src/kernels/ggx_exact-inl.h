@@ -19,6 +19,7 @@ inline constexpr float kRimZ = kHorizon;
 
 // Visible normals whose reflection is not occluded, in exact proportion.
 struct GgxExact : SamplerTraits {
+  static constexpr bool kLongChain = true;
   static constexpr bool kReadsArea = false;
   static constexpr bool kUnit = false;
   static constexpr bool kUsesU3 = true;

@@ -171,25 +171,35 @@ HWY_INLINE void FetchAhead(const Tile& tile, std::size_t lane, std::size_t lanes
     for (std::size_t k = 0; k < tile.ahead_count; ++k) __builtin_prefetch(tile.ahead[k] + line);
 }
 
-// An operation is a struct that loads its inputs and has Run<kFast>(). Whole vectors of ordinary lanes, nearly
-// all, take the fast way, which knows no exceptions; an ordinary lane's results are the same both ways.
-// Kernels that fetch ahead are compiled apart: the mere test for it would cost the others 2 to 4 %.
-template <class D, class Op, bool kFetchesAhead = false>
-void ForEachVector(const Tile& given, Statistics& statistics) {
+template <class D, class Op>
+HWY_NOINLINE void RunWithExceptions(const Tile& tile, std::size_t lane, Statistics& statistics) {
   const D d{};
+  Op(d, tile, lane).template Run<false>(d, tile, lane, statistics);
+}
+
+// An operation is a struct template over a tag and others that loads its inputs and has Run<kFast>(). Where all lanes are
+// ordinary, nearly always, the fast way is taken, which knows no exceptions; an ordinary lane's results are the same both
+// ways. The other way goes vector by vector, even if the fast one takes several (W): then one odd lane costs less, and so
+// does the compiler. Kernels that fetch ahead are compiled apart: the mere test for it would cost the others 2 to 4 %.
+template <class W, class D, bool kFetchesAhead, template <class, class...> class Op, class... Others>
+void ForEachVector(const Tile& given, Statistics& statistics) {
+  const W w{};
+  // Copies that nobody else sees: stores could otherwise be to them.
   const Tile tile = given;
   Statistics counted;
-  for (std::size_t lane = 0; lane < tile.lanes; lane += Lanes(d)) {
-    if constexpr (kFetchesAhead) FetchAhead(tile, lane, Lanes(d));
-    const Op operation(d, tile, lane);
+  for (std::size_t lane = 0; lane < tile.lanes; lane += Lanes(w)) {
+    if constexpr (kFetchesAhead) FetchAhead(tile, lane, Lanes(w));
     // Not for the portable fallback: it is slow anyhow, and compiles in half the time.
     if constexpr (HWY_TARGET != HWY_SCALAR) {
-      if (HWY_LIKELY(operation.AllOrdinary(d, tile, lane) && lane + Lanes(d) <= tile.lanes)) {
-        operation.template Run<true>(d, tile, lane, counted);
+      const Op<W, Others...> operation(w, tile, lane);
+      if (HWY_LIKELY(operation.AllOrdinary(w, tile, lane) && lane + Lanes(w) <= tile.lanes)) {
+        operation.template Run<true>(w, tile, lane, counted);
         continue;
       }
     }
-    operation.template Run<false>(d, tile, lane, counted);
+    const std::size_t end = HWY_MIN(lane + Lanes(w), tile.lanes);
+    for (std::size_t one = lane; one < end; one += Lanes(D()))
+      RunWithExceptions<D, Op<D, Others...>>(given, one, statistics);
   }
   statistics += counted;
 }

@@ -16,30 +16,31 @@ HWY_BEFORE_NAMESPACE();
 namespace facetwise {
 namespace HWY_NAMESPACE {
 
-// A surface's kernels for vectors D, one sampler after the other. Samplers with a long chain take four vectors at a time
-// (docs/numerics.md).
+// A surface's kernels for vectors D, one sampler after the other. Long chains of operations go two or four vectors at a time
+// (docs/numerics.md); four are compiled where it matters most, since they take the compiler long.
 template <class S, class D>
 struct Registrar {
   SurfaceKernels kernels{};
 
   constexpr Registrar() {
-    kernels.masking = ForEachVector<D, MaskingOf<D, S>>;
-    kernels.albedo = ForEachVector<D, AlbedoOf<D, S>>;
-    kernels.compensation = ForEachVector<D, CompensationOf<D, S>>;
-    kernels.lobe = ForEachVector<D, LobeOf<D, S>>;
-    kernels.with_lobe = ForEachVector<D, WithLobe<D, S>>;
+    kernels.masking = ForEachVector<D, D, false, MaskingOf, S>;
+    kernels.albedo = ForEachVector<D, D, false, AlbedoOf, S>;
+    kernels.compensation = ForEachVector<D, D, false, CompensationOf, S>;
+    kernels.lobe = ForEachVector<D, D, false, LobeOf, S>;
+    kernels.with_lobe = ForEachVector<D, D, false, WithLobe, S>;
   }
   template <class Drawer>
   constexpr Registrar& Add(Sampler sampler) {
     const auto index = static_cast<std::size_t>(sampler);
-    using T = std::conditional_t<Drawer::kExact || S::Distribution::kLongChains, Four<D>, D>;
-    kernels.sample[index] = ForEachVector<T, Sample<T, S, Drawer>>;
+    using Wide = std::conditional_t<Drawer::kLongChain && !S::kAffine, Four<D>, Two<D>>;
+    using W = std::conditional_t<Drawer::kLongChain || S::Distribution::kLongChains, Wide, D>;
+    kernels.sample[index] = ForEachVector<W, D, false, Sample, S, Drawer>;
     if constexpr (S::Distribution::kWaitsForMemory && kStreams<D>)
-      kernels.sample_ahead[index] = ForEachVector<Two<D>, Sample<Two<D>, S, Drawer>, true>;
-    kernels.query[index] = ForEachVector<D, Query<D, S, Drawer>>;
+      kernels.sample_ahead[index] = ForEachVector<Two<D>, D, true, Sample, S, Drawer>;
+    kernels.query[index] = ForEachVector<D, D, false, Query, S, Drawer>;
     if constexpr (Drawer::kNormals) {
-      kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;
-      kernels.scatter_query[index] = ForEachVector<D, ScatterQuery<D, S, Drawer>>;
+      kernels.scatter[index] = ForEachVector<D, D, false, Scatter, S, Drawer>;
+      kernels.scatter_query[index] = ForEachVector<D, D, false, ScatterQuery, S, Drawer>;
     }
     return *this;
   }
@@ -47,10 +48,10 @@ struct Registrar {
   template <class Drawer, class SameDensity>
   constexpr Registrar& Add(Sampler sampler) {
     const auto index = static_cast<std::size_t>(sampler);
-    kernels.sample[index] = ForEachVector<D, Sample<D, S, Drawer>>;
-    kernels.query[index] = ForEachVector<D, Query<D, S, SameDensity>>;
-    kernels.scatter[index] = ForEachVector<D, Scatter<D, S, Drawer>>;
-    kernels.scatter_query[index] = ForEachVector<D, ScatterQuery<D, S, SameDensity>>;
+    kernels.sample[index] = ForEachVector<D, D, false, Sample, S, Drawer>;
+    kernels.query[index] = ForEachVector<D, D, false, Query, S, SameDensity>;
+    kernels.scatter[index] = ForEachVector<D, D, false, Scatter, S, Drawer>;
+    kernels.scatter_query[index] = ForEachVector<D, D, false, ScatterQuery, S, SameDensity>;
     return *this;
   }
 };

@@ -90,6 +90,7 @@ struct SamplerTraits {
   static constexpr bool kShifted = true;           // N is times exp(shift), as sigma is (surface-inl.h)
   static constexpr bool kOwnShift = false;         // N is times e^(shift) of the sample's own
   static constexpr bool kExact = false;            // for i_z > 0 no reflection is occluded; o_z is raised to kRim
+  static constexpr bool kLongChain = false;        // gains from four vectors at a time
   static constexpr bool kReadsArea = true;         // sigma(i) is read in front, also where no weight is wanted
   static constexpr bool kUnboundedWeight = false;  // what a file says decides how large it is
   static constexpr bool kNormals = true;           // serves normals and transmission too, not only reflections

@@ -80,6 +80,7 @@ struct SlopeNdf : SamplerTraits, SlopeNormals {
 // Visible normals by the distribution's DrawVisible(d, i, horizontal, u1, u2, x, y, im), with x along the azimuth and
 // im = w_z - horizontal x, horizontal the length of (w_x, w_y).
 struct SlopeVisible : SlopeNormals, VisibleNormals {
+  static constexpr bool kLongChain = true;
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void Draw(D d, const I& i, V u1, V u2, V&, Drawn<D>& drawn) {
     const V horizontal = Sqrt(i.a);

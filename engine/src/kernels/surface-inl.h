@@ -40,7 +40,7 @@ struct DistributionTraits {
   static constexpr float kLargestRoughness = kLargestAlpha;
   static constexpr bool kShifts = false;              // densities and areas are kept times e^(shift)
   static constexpr bool kWaitsForMemory = false;      // so quick that large calls wait for their columns
-  static constexpr bool kLongChains = false;          // sampling gains from several vectors at a time
+  static constexpr bool kLongChains = false;          // all sampling gains from two vectors at a time
   static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
   static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
   // What Area() leaves to a sampler.
