@@ -15,7 +15,7 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 struct Ggx : DistributionTraits {
-  static constexpr bool kWaitsForMemory = true;
+  static constexpr bool kQuick = true;
   static constexpr bool kHasShareUnoccluded = true;
 
   template <class D, class I>

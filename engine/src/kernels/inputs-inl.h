@@ -171,6 +171,16 @@ HWY_INLINE void FetchAhead(const Tile& tile, std::size_t lane, std::size_t lanes
     for (std::size_t k = 0; k < tile.ahead_count; ++k) __builtin_prefetch(tile.ahead[k] + line);
 }
 
+// Most calls sample a conductor's reflections in the caches. A loop that knows it is 2 to 11 % quicker.
+HWY_INLINE void MakePlain(Tile& tile) {
+  tile.normals_alone = tile.retro = false;
+  tile.interface = Interface::conductor;
+  tile.streamed = 0;
+}
+HWY_INLINE bool IsPlain(const Tile& tile) {
+  return !tile.normals_alone && !tile.retro && tile.interface == Interface::conductor && tile.streamed == 0;
+}
+
 template <class D, class Op>
 HWY_NOINLINE void RunWithExceptions(const Tile& tile, std::size_t lane, Statistics& statistics) {
   const D d{};
@@ -181,11 +191,13 @@ HWY_NOINLINE void RunWithExceptions(const Tile& tile, std::size_t lane, Statisti
 // ordinary, nearly always, the fast way is taken, which knows no exceptions; an ordinary lane's results are the same both
 // ways. The other way goes vector by vector, even if the fast one takes several (W): then one odd lane costs less, and so
 // does the compiler. Kernels that fetch ahead are compiled apart: the mere test for it would cost the others 2 to 4 %.
-template <class W, class D, bool kFetchesAhead, template <class, class...> class Op, class... Others>
-void ForEachVector(const Tile& given, Statistics& statistics) {
+template <class W, class D, bool kFetchesAhead, bool kPlain, template <class, class...> class Op, class... Others>
+HWY_INLINE void LoopOverVectors(const Tile& given, Statistics& statistics) {
   const W w{};
   // Copies that nobody else sees: stores could otherwise be to them.
-  const Tile tile = given;
+  Tile own = given;
+  if constexpr (kPlain) MakePlain(own);
+  const Tile tile = own;
   Statistics counted;
   for (std::size_t lane = 0; lane < tile.lanes; lane += Lanes(w)) {
     if constexpr (kFetchesAhead) FetchAhead(tile, lane, Lanes(w));
@@ -202,6 +214,19 @@ void ForEachVector(const Tile& given, Statistics& statistics) {
       RunWithExceptions<D, Op<D, Others...>>(given, one, statistics);
   }
   statistics += counted;
+}
+template <class W, class D, bool kFetchesAhead, template <class, class...> class Op, class... Others>
+void ForEachVector(const Tile& tile, Statistics& statistics) {
+  LoopOverVectors<W, D, kFetchesAhead, false, Op, Others...>(tile, statistics);
+}
+
+template <class W, class D, template <class, class...> class Op, class... Others>
+void ForEachVectorOfSamples(const Tile& tile, Statistics& statistics) {
+  if (IsPlain(tile)) {
+    LoopOverVectors<W, D, false, true, Op, Others...>(tile, statistics);
+  } else {
+    LoopOverVectors<W, D, false, false, Op, Others...>(tile, statistics);
+  }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -34,8 +34,12 @@ struct Registrar {
     const auto index = static_cast<std::size_t>(sampler);
     using Wide = std::conditional_t<Drawer::kLongChain && !S::kAffine, Four<D>, Two<D>>;
     using W = std::conditional_t<Drawer::kLongChain || S::Distribution::kLongChains, Wide, D>;
-    kernels.sample[index] = ForEachVector<W, D, false, Sample, S, Drawer>;
-    if constexpr (S::Distribution::kWaitsForMemory && kStreams<D>)
+    if constexpr (S::Distribution::kQuick && !S::kAffine && hn::MaxLanes(D()) > 1) {
+      kernels.sample[index] = ForEachVectorOfSamples<W, D, Sample, S, Drawer>;
+    } else {
+      kernels.sample[index] = ForEachVector<W, D, false, Sample, S, Drawer>;
+    }
+    if constexpr (S::Distribution::kQuick && kStreams<D>)
       kernels.sample_ahead[index] = ForEachVector<Two<D>, D, true, Sample, S, Drawer>;
     kernels.query[index] = ForEachVector<D, D, false, Query, S, Drawer>;
     if constexpr (Drawer::kNormals) {

@@ -38,8 +38,8 @@ inline constexpr float kSmallestA = 0x1p-50f, kSmallestHorizontal = 0x1p-25f;  /
 // What a distribution is unless it says otherwise.
 struct DistributionTraits {
   static constexpr float kLargestRoughness = kLargestAlpha;
-  static constexpr bool kShifts = false;              // densities and areas are kept times e^(shift)
-  static constexpr bool kWaitsForMemory = false;      // so quick that large calls wait for their columns
+  static constexpr bool kShifts = false;  // densities and areas are kept times e^(shift)
+  static constexpr bool kQuick = false;  // so quick that tests of what is wanted count, and large calls wait for memory
   static constexpr bool kLongChains = false;          // all sampling gains from two vectors at a time
   static constexpr bool kOwnMean = false;             // the table's mean slope is added to the batch's
   static constexpr bool kHasShareUnoccluded = false;  // ShareUnoccluded() is known
