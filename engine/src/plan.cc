@@ -55,7 +55,7 @@ std::size_t best_head(const Plan& plan) {
 }
 
 // Whether more columns lie at one place of their pages, and so in one set of the first-level cache, than it can well
-// serve. Measured with 8 ways: docs/numerics.md, "Fetching ahead".
+// serve. Measured with 8 ways: docs/performance.md, "Fetching ahead".
 bool share_a_set(const Plan& plan) {
   constexpr unsigned kLinesOfPage = 4096 / sizeof(float) / kLine, kMany = 4;
   unsigned columns[kLinesOfPage] = {}, most = 0;

@@ -17,7 +17,7 @@ namespace facetwise {
 namespace HWY_NAMESPACE {
 
 // A surface's kernels for vectors D, one sampler after the other. Long chains of operations go two or four vectors at a time
-// (docs/numerics.md); four are compiled where it matters most, since they take the compiler long.
+// (docs/performance.md); four are compiled where it matters most, since they take the compiler long.
 template <class S, class D>
 struct Registrar {
   SurfaceKernels kernels{};
