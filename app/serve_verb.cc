@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -62,8 +63,13 @@ absl::Status fill_options(CLI::App& command, const std::string& path) {
   std::map<std::string, std::vector<std::string>> file;
   if (!path.empty()) {
     std::ifstream in(path);
-    if (!in) return absl::NotFoundError(fmt::format("--config: {}: cannot be read", path));
-    for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(in)) file[item.fullname()] = item.inputs;
+    if (!in || std::filesystem::is_directory(path))
+      return absl::NotFoundError(fmt::format("--config: {}: cannot be read", path));
+    try {
+      for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(in)) file[item.fullname()] = item.inputs;
+    } catch (const CLI::Error& error) {
+      return invalid("--config: {}: {}", path, error.what());
+    }
   }
   for (const auto& [name, values] : file)
     if (name == "config" || command.get_option_no_throw("--" + name) == nullptr)

@@ -20,13 +20,13 @@ struct Beckmann : SlopeDistribution<Beckmann>, DistributionTraits {
   static constexpr bool kShifts = true;
   static constexpr bool kLongChains = true;
 
-  // The visible slopes' distribution along the azimuth, for k > 0: (k - x) e^(-x^2), x < k.
+  // What the visible slopes' density along the azimuth depends on: (k - x) e^(-x^2), x < k, for k = |w_z| / sqrt(A).
   template <class D>
   struct Kept {
     using V = Vec<D>;
     V k;
     V beyond;  // share of all slopes above k
-    V total;   // sigma / sqrt(A)
+    V total;   // sigma / sqrt(A) in front
     HWY_INLINE Kept() {}
     HWY_INLINE Kept(D d, V k_, V erfcx, V tail) : k(k_) {
       const V half_gauss = Set(d, 0.5f) * Gauss(d, k);

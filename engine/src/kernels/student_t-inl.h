@@ -83,20 +83,19 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
   // In the frame stretched by sqrt(2) alpha, x = (t - 1/t) / 2; x's largest value has t = T = (1 + c) / s. The share
   // below t = T z is
   //   F(z) = z^3 ((T^2 - 1) z (3 + T^2 z^2) + 4) (1 + T^2) / (1 + T^2 z^2)^3,
-  // solved by two steps of Householder's third order: error of F 1e-9, and of float 6e-7. They start from the solutions
-  // for T = 1 and T = infinity in q = (t^2 - 1) / (t^2 + 1), weighted by c, for T < 1 from the former in z. Given x, y's
-  // share is that of a fixed density.
+  // solved by one step of Householder's third order, and another in the tails and for T < 1: error of F 3e-7, and of float
+  // 8e-7. It starts from the solutions for T = 1 and T = infinity in q = (t^2 - 1) / (t^2 + 1), between which it is fitted in
+  // s and in the q for T = 1; for T < 1 from that solution in z. Given x, y's share is that of a fixed density.
   template <class D, class I, class V = Vec<D>>
   static HWY_INLINE void DrawVisible(D d, const I& i, V horizontal, V u1, V u2, V& x, V& y, V& im) {
     DrawVisible(d, i.kept, i.wz, horizontal, u1, u2, x, y, im);
   }
   template <class D, class V = Vec<D>>
   static HWY_NOINLINE void DrawVisible(D d, const Kept<D>& kept, V wz, V horizontal, V u1, V u2, V& x, V& y, V& im) {
-    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), three = Set(d, 3.0f), quarter = Set(d, 0.25f),
-            root2 = Set(d, kRoot2);
+    const V zero = Zero(d), one = Set(d, 1.0f), half = Set(d, 0.5f), root2 = Set(d, kRoot2);
     const V sum = kept.sum, nu = kept.nu;
-    // Within 2^-13 of straight down it makes no difference.
-    const V t_max = Min(sum / (root2 * Max(horizontal, Set(d, kSmallestHorizontal))), Set(d, 0x1p13f));
+    // Nearer to straight down the share changes by 1e-7 at most.
+    const V t_max = Min(sum / (root2 * Max(horizontal, Set(d, kSmallestHorizontal))), Set(d, 0x1p22f));
     const V t2 = t_max * t_max;
     const V one_t2 = one + t2, inverse_one_t2 = one / one_t2;
 
@@ -104,36 +103,21 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     const V inverse_root = RoughInverseCubeRoot(d, u);
     const V s1 = u * inverse_root * inverse_root;  // cube root
     const V q1 = Sqrt(Max(NegFma(s1, s1, one), zero));
-    const V low = Min(u, rest) * Set(d, 4.0f);
-    const V end = Sqrt(low / (three - Sqrt(low * Set(d, 1.0f / 3.0f))));
+    const V root = Sqrt(Min(u, rest) * Set(d, 4.0f / 3.0f));
+    const V end = Fma(root * root,
+                      Fma(root, Fma(root, Set(d, 0.162819401f), Set(d, -0.0240250002f)), Set(d, 0.185360655f)), root);
     const auto lower = u < half;
     // 1 + q for T = 1 and T = infinity
     const V from = s1 * s1 / (one + q1), to = Select(lower, end, Set(d, 2.0f) - end);
-    const V c = Max((t2 - one) * inverse_one_t2, zero);
-    const V onep = Fma(c, to - from, from);
+    const V c = Max((t2 - one) * inverse_one_t2, zero), s = (t_max + t_max) * inverse_one_t2;
+    const V bend0 = Fma(q1, Fma(q1, Set(d, 1.130053f), Set(d, 0.19003615f)), Set(d, 0.01235261f));
+    const V bend1 = Fma(q1, Fma(q1, Set(d, -0.76910435f), Set(d, 0.05782772f)), Set(d, -0.00966852f));
+    const V onep = Fma(NegFma(c * s, Fma(s, bend1, bend0), c), to - from, from);
     V z = onep / (Sqrt(onep * (Set(d, 2.0f) - onep)) * Max(t_max, one));
     z = Min(z, Set(d, 1.0f - 0x1p-12f));
-    for (int step = 0; step < 2; ++step) {
-      const V zz = z * z, t2z = t2 * z;
-      const V inverse_b = one / Fma(t2, zz, one);
-      const V scale = one_t2 * (inverse_b * inverse_b * inverse_b);
-      const V f = NegFma(zz * z * Fma((t2 - one) * z, Fma(t2z, z, three), Set(d, 4.0f)), scale, u);
-      // F' = 12 z w (1 + T^2) / b^4 with w = z (1 - z)(T^2 z + 1). The first and second derivative of log F', times w
-      // and w^2: `bend`, `bend2`.
-      const V gone = one - z, linear = t2z + one;
-      const V a0 = gone * linear, a1 = z * linear, a2 = t2z * gone, w = z * a0;
-      const V slope = Set(d, 12.0f) * w * w * z * (scale * inverse_b);  // F' w
-      const V inner = Set(d, 8.0f) * t2 * inverse_b * w;
-      const V bend = NegFma(inner, z, a0 + a0 - a1 + a2);
-      const V bend2 =
-          Fma(inner * w, Fma(t2z * z, inverse_b + inverse_b, Neg(one)), Neg(Fma(a0 + a0, a0, Fma(a1, a1, a2 * a2))));
-      const V slope2 = slope * slope;
-      const V third = Fma(bend, bend, bend2) * Set(d, 1.0f / 6.0f);
-      const V denominator = Fma(f * f, third, Fma(bend * slope, f, slope2));
-      const V change = w * f * Fma(half * bend, f, slope) / Max(denominator, Set(d, 0.2f) * slope2);
-      // Where rounding decides how near to 1 it is, one step does not go so near that the next cannot come back.
-      z = Min(Max(z + change, z * quarter), NegFma(quarter, gone, one));
-    }
+    z = Householder(d, z, u, t2, one_t2);
+    const auto again = Or(Min(u, rest) < Set(d, 0x1p-10f), t_max < one);
+    if (!AllFalse(d, again)) z = Select(again, Householder(d, z, u, t2, one_t2), z);
     const V t = t_max * z, inverse_t = one / t;
     x = root2 * half * (t - inverse_t);
     // w_z - horizontal x = nu (1 - z)(T^2 z + 1) / (z (1 + T^2)); near straight down, where T is not w's, by the slope.
@@ -141,6 +125,31 @@ struct StudentT : SlopeDistribution<StudentT>, DistributionTraits {
     im = Select(t_max > Set(d, 64.0f), Max(NegFma(horizontal, x, wz), zero), im);
     // y = sqrt(1 + x^2) times a number with density ~ (1 + y^2)^-3.
     y = root2 * half * (t + inverse_t) * Conditional(d, u2);
+  }
+
+  // One step from z towards F(z) = u.
+  template <class D, class V = Vec<D>>
+  static HWY_INLINE V Householder(D d, V z, V u, V t2, V one_t2) {
+    const V one = Set(d, 1.0f), half = Set(d, 0.5f), quarter = Set(d, 0.25f);
+    const V zz = z * z, t2z = t2 * z;
+    const V inverse_b = one / Fma(t2, zz, one);
+    const V scale = one_t2 * (inverse_b * inverse_b * inverse_b);
+    const V f = NegFma(zz * z * Fma((t2 - one) * z, Fma(t2z, z, Set(d, 3.0f)), Set(d, 4.0f)), scale, u);
+    // F' = 12 z w (1 + T^2) / b^4 with w = z (1 - z)(T^2 z + 1). The first and second derivative of log F', times w
+    // and w^2: `bend`, `bend2`.
+    const V gone = one - z, linear = t2z + one;
+    const V a0 = gone * linear, a1 = z * linear, a2 = t2z * gone, w = z * a0;
+    const V slope = Set(d, 12.0f) * w * w * z * (scale * inverse_b);  // F' w
+    const V inner = Set(d, 8.0f) * t2 * inverse_b * w;
+    const V bend = NegFma(inner, z, a0 + a0 - a1 + a2);
+    const V bend2 =
+        Fma(inner * w, Fma(t2z * z, inverse_b + inverse_b, Neg(one)), Neg(Fma(a0 + a0, a0, Fma(a1, a1, a2 * a2))));
+    const V slope2 = slope * slope;
+    const V third = Fma(bend, bend, bend2) * Set(d, 1.0f / 6.0f);
+    const V denominator = Fma(f * f, third, Fma(bend * slope, f, slope2));
+    const V change = w * f * Fma(half * bend, f, slope) / Max(denominator, Set(d, 0.2f) * slope2);
+    // Where rounding decides how near to 1 it is, one step does not go so near that the next cannot come back.
+    return Min(Max(z + change, z * quarter), NegFma(quarter, gone, one));
   }
 
   // V-cavity behind. With k = |i_z| / sqrt(A), n(k)^2 = 2 + k^2 and sigma(-i) / sqrt(A) = 1 / D(k), D(k) = n (n + k)^2,
