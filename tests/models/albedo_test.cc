@@ -1,5 +1,6 @@
 // Directional albedo and compensation: against the reference's quadrature, a furnace, and Turquin's formula.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -551,7 +552,8 @@ TEST_P(AlbedoFiles, KeepTables) {
   model.interface = GetParam() == Interface::dielectric ? Interface::schlick : Interface::dielectric;
   EXPECT_FALSE((*table)->fits(model));
 
-  const std::string path = std::filesystem::temp_directory_path() / "facetwise_albedo_test.table";
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("facetwise_albedo_test" + std::to_string(getpid()) + ".table");
   ASSERT_TRUE((*table)->save(path).ok());
   const auto read = AlbedoTable::load(path);
   std::filesystem::remove(path);
