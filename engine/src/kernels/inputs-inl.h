@@ -195,9 +195,8 @@ template <class W, class D, bool kFetchesAhead, bool kPlain, template <class, cl
 HWY_INLINE void LoopOverVectors(const Tile& given, Statistics& statistics) {
   const W w{};
   // Copies that nobody else sees: stores could otherwise be to them.
-  Tile own = given;
-  if constexpr (kPlain) MakePlain(own);
-  const Tile tile = own;
+  Tile tile = given;
+  if constexpr (kPlain) MakePlain(tile);
   Statistics counted;
   for (std::size_t lane = 0; lane < tile.lanes; lane += Lanes(w)) {
     if constexpr (kFetchesAhead) FetchAhead(tile, lane, Lanes(w));
