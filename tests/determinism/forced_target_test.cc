@@ -53,7 +53,8 @@ std::map<std::string, int> profile(const Call& call, const Lanes& lanes, const E
   const itimerval every_millisecond = {{0, 1000}, {0, 1000}}, never = {};
   sampled = 0;
   setitimer(ITIMER_PROF, &every_millisecond, nullptr);
-  while (sampled < 10) run_ok(call, batch, execution);
+  // Of the fallback many are in the C library's fma.
+  while (sampled < 40) run_ok(call, batch, execution);
   setitimer(ITIMER_PROF, &never, nullptr);
   sigaction(SIGPROF, &before, nullptr);
 
