@@ -14,6 +14,7 @@
 #include "bench/machine.h"
 #include "facetwise/remote_tables.h"
 #include "facetwise/v1/sampler.pb.h"
+#include "wire/fields.h"
 
 namespace facetwise::app {
 namespace {
@@ -47,6 +48,17 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
   for (const RemoteTable& table : *tables) ids.push_back(fmt::format("{:016x}", table.id));
   Json targets = Json::array();
   for (const std::string& target : info.available_targets()) targets.push_back(target);
+  Json models = Json::array();
+  for (const v1::ModelInfo& model : info.models()) {
+    std::string line =
+        fmt::format("{}-{}:", name(wire::distribution_from(model.distribution()).value_or(Distribution())),
+                    name(wire::masking_from(model.masking()).value_or(Masking())));
+    for (const int sampler : model.samplers())
+      line += fmt::format(" {}", name(wire::sampler_from(sampler, Sampler::visible).value_or(Sampler::visible)));
+    models.push_back(line);
+  }
+  const v1::ServerLimits& limits = info.limits();
+  const v1::ServerLoad& load = info.load();
   return Json{{"version", info.version()},
               {"target", info.target()},
               {"available_targets", targets},
@@ -54,15 +66,33 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
               {"threads", info.threads()},
               {"max_message_bytes", info.max_message_bytes()},
               {"benchmark_allowed", info.benchmark_allowed()},
-              {"slope_tables", ids}};
+              {"slope_tables", ids},
+              {"models", models},
+              {"limits",
+               {{"calls", limits.calls()},
+                {"open_calls", limits.open_calls()},
+                {"held_bytes", limits.held_bytes()},
+                {"connections", limits.connections()},
+                {"table_bytes", limits.table_bytes()},
+                {"lanes", limits.lanes()}}},
+              {"load",
+               {{"calls", load.calls()},
+                {"open_calls", load.open_calls()},
+                {"held_bytes", load.held_bytes()},
+                {"connections", load.connections()},
+                {"table_bytes", load.table_bytes()},
+                {"lanes", load.lanes()},
+                {"uptime_seconds", load.uptime_seconds()}}}};
 }
 
 void print(const Json& info) {
   for (const auto& [key, value] : info.items()) {
     std::string text;
-    if (value.is_array())
-      text = fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), " "));
-    else
+    if (value.is_array()) {
+      text = fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), key == "models" ? ", " : " "));
+    } else if (value.is_object()) {
+      for (const auto& [name, number] : value.items()) text += fmt::format("{} {}  ", name, number.dump());
+    } else
       text = value.is_string() ? value.get<std::string>() : value.dump();
     fmt::print("{:<18} {}\n", key, text);
   }

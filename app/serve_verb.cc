@@ -1,5 +1,6 @@
 // serve: the library's calls for other processes and machines.
 #include <fmt/format.h>
+#include <pwd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include <stdexcept>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/numbers.h"
 #include "app/arguments.h"
 #include "app/benchmark_messages.h"
 #include "app/errors.h"
@@ -22,6 +24,28 @@ namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 
+// Of a name or a number.
+std::optional<unsigned> user_id(const std::string& user) {
+  unsigned id = 0;
+  if (absl::SimpleAtoi(user, &id)) return id;
+  const passwd* entry = getpwnam(user.c_str());
+  return entry == nullptr ? std::nullopt : std::optional<unsigned>(entry->pw_uid);
+}
+
+std::optional<LogFormat> parse_log(std::string_view name) {
+  if (name == "none") return LogFormat::none;
+  if (name == "text") return LogFormat::text;
+  if (name == "json") return LogFormat::json;
+  return std::nullopt;
+}
+
+std::optional<LogLevel> parse_level(std::string_view name) {
+  if (name == "debug") return LogLevel::debug;
+  if (name == "info") return LogLevel::info;
+  if (name == "warning") return LogLevel::warning;
+  return std::nullopt;
+}
+
 struct ServeVerb {
   ServerOptions options;
   std::size_t max_message_mib = 16, max_mib_in_flight = 4096;
@@ -29,6 +53,7 @@ struct ServeVerb {
   int drain_seconds = 10, read_seconds = 20, write_seconds = 60, patience_ms = 2000, stream_idle_seconds = 300,
       table_idle_seconds = 3600;
   std::string unix_mode = "0600", config;
+  std::vector<std::string> unix_users;
 
   int run() {
     if (max_mib_in_flight < 5 * max_message_mib)
@@ -47,11 +72,13 @@ struct ServeVerb {
     options.table_idle_timeout = std::chrono::seconds(table_idle_seconds);
     options.drain_timeout = std::chrono::seconds(drain_seconds);
     options.unix_mode = static_cast<unsigned>(std::stoul(unix_mode, nullptr, 8));
+    for (const std::string& user : unix_users) options.unix_users.push_back(*user_id(user));
     options.benchmark = benchmark_runner(options.execution.target, options.threads);
     const absl::Status status = serve(options, [&](const Server& server) {
       const Target target = *resolve(options.execution.target);
       for (const std::string& address : server.addresses())
         fmt::print("facetwise {} listens on {} ({} kernels)\n", version(), address, name(target));
+      if (!server.metrics().empty()) fmt::print("metrics at http://{}/metrics\n", server.metrics());
       std::fflush(stdout);
     });
     return status.ok() ? kDone : fail("serve", status);
@@ -110,6 +137,7 @@ std::string check_mode(const std::string& text) {
 Verb add_serve(CLI::App& app) {
   auto arguments = std::make_shared<ServeVerb>();
   ServerOptions& options = arguments->options;
+  options.log = LogFormat::text;
   CLI::App& command = *app.add_subcommand("serve", "Answer the library's calls over gRPC until SIGTERM");
   command.footer(
       R"(On SIGTERM or SIGINT it takes no new calls, finishes those in flight and exits with 0. The protocol
@@ -166,6 +194,24 @@ Examples:
   command.add_option("--unix-mode", arguments->unix_mode, "Permissions of Unix sockets, octal; default 0600")
       ->check(check_mode)
       ->option_text("MODE");
+  command
+      .add_option("--unix-user", arguments->unix_users,
+                  "Only this user's processes may connect to Unix sockets; may be repeated")
+      ->check([](const std::string& user) {
+        return user_id(user) ? "" : fmt::format("\"{}\" is no user of this machine", user);
+      })
+      ->allow_extra_args(false)
+      ->option_text("NAME|ID");
+  command
+      .add_option(
+          "--metrics", options.metrics,
+          "Give counts and load at http://IP:PORT/metrics, for Prometheus, without TLS; port 0 takes a free one")
+      ->option_text("IP:PORT");
+  add_named(command, "--log", options.log, parse_log,
+            "Write what happens to standard error, a line an event; default text", "none|text|json");
+  add_named(command, "--log-level", options.log_level, parse_level,
+            "debug: each call too; info: also calls that fail; warning: only what the server lacks; default info",
+            "debug|info|warning");
   add_number("--drain-seconds", arguments->drain_seconds, 0, 86400,
              "Longest wait for calls in flight at the end; default 10");
   command.add_flag("--allow-benchmark", options.allow_benchmark, "Let clients run benchmarks on this machine");

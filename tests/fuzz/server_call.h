@@ -33,6 +33,7 @@ template <class Answer>
 void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   static Compute compute(1, {});
   static Tables tables(0, {});
+  static Metrics metrics({}, [] { return v1::ServerLoad(); });
   static const std::atomic<bool> stop{false};
   static Admission admission({8, 8, 64 * kMessageBytes, kMessageBytes, std::chrono::milliseconds(1000)});
   static const bool ready = [] {
@@ -49,7 +50,8 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   grpc::ByteBuffer request(slices.data(), slices.size());
   Admission::Stay stay(
       admission, [] {}, "");
-  const CallTools tools{{kMessageBytes}, compute, tables, stay, stop};
+  CallFacts facts;
+  const CallTools tools{{kMessageBytes}, compute, tables, stay, stop, metrics, facts};
   const auto answered = wait_for(answer(request, tools));
   // What is too much or malformed is refused; nothing else goes wrong.
   if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&

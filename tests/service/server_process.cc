@@ -21,7 +21,7 @@ TemporaryFolder::TemporaryFolder() {
 
 TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
-ServerProcess::ServerProcess(const std::vector<std::string>& arguments) {
+ServerProcess::ServerProcess(const std::vector<std::string>& arguments, const std::string& errors_file) {
   std::vector<std::string> words = {FACETWISE_TEST_SERVER};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
@@ -35,7 +35,7 @@ ServerProcess::ServerProcess(const std::vector<std::string>& arguments) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that crashes leaves no server
     if (getppid() != parent) _exit(127);
     dup2(out[1], STDOUT_FILENO);
-    dup2(err[1], STDERR_FILENO);
+    dup2(errors_file.empty() ? err[1] : open(errors_file.c_str(), O_WRONLY), STDERR_FILENO);
     execv(pointers[0], pointers.data());
     _exit(127);
   }

@@ -24,7 +24,8 @@ class TemporaryFolder {
 class ServerProcess {
  public:
   // Starts the test server and waits until it is ready, or has ended.
-  explicit ServerProcess(const std::vector<std::string>& arguments);
+  // With `errors_file`, stderr goes there.
+  explicit ServerProcess(const std::vector<std::string>& arguments, const std::string& errors_file = "");
   ~ServerProcess();  // kills it if it still runs
   ServerProcess(const ServerProcess&) = delete;
   ServerProcess& operator=(const ServerProcess&) = delete;

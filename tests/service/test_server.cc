@@ -57,9 +57,16 @@ int main(int argc, char** argv) {
   app.add_option("--tls-key", options.tls_key);
   app.add_option("--tls-client-ca", options.tls_client_ca);
   app.add_option("--token-file", options.token_file);
+  app.add_option("--unix-mode", options.unix_mode);
+  app.add_option("--unix-user", options.unix_users);
+  app.add_option("--metrics", options.metrics);
+  bool logs = false;
+  app.add_flag("--log", logs, "each call, as JSON");
   app.add_flag("--allow-benchmark", options.allow_benchmark);
   CLI11_PARSE(app, argc, argv);
   if (const rlimit limit{files, files}; files > 0) setrlimit(RLIMIT_NOFILE, &limit);
+  if (logs) options.log = facetwise::LogFormat::json;
+  options.log_level = facetwise::LogLevel::debug;
   options.drain_pause = std::chrono::milliseconds(pause_ms);
   options.drain_timeout = std::chrono::milliseconds(drain_ms);
   options.read_timeout = std::chrono::milliseconds(read_ms);
@@ -70,6 +77,7 @@ int main(int argc, char** argv) {
   options.benchmark = report_steps;
   const absl::Status status = facetwise::serve(options, [](const facetwise::Server& server) {
     for (const std::string& address : server.addresses()) std::printf("%s\n", address.c_str());
+    if (!server.metrics().empty()) std::printf("%s\n", server.metrics().c_str());
     std::printf("ready\n");
     std::fflush(stdout);
   });

@@ -50,6 +50,7 @@ class Sender {
       : connections_(connections),
         options_(options),
         pieces_(pieces),
+        traceparent_(options.traceparent ? options.traceparent() : ""),
         calls_(std::min<std::size_t>(std::max(options.window, 1), pieces.count)),
         servers_(connections.size()) {}
 
@@ -134,6 +135,7 @@ class Sender {
     call.context.emplace();
     call.context->set_deadline(std::chrono::system_clock::now() + options_.call_timeout);
     channel.authorise(*call.context);
+    if (!traceparent_.empty()) call.context->AddMetadata("traceparent", traceparent_);
     call.response.Clear();
     call.in_flight = true;
     ++in_flight_;
@@ -157,6 +159,12 @@ class Sender {
                          : absl::Status(status.code(), absl::StrCat("server ", address, ": ", status.message()));
     }
     last_error_ = wire::from_grpc(call.status, address);
+    // As the server's log names it.
+    const auto& trailer = call.context->GetServerTrailingMetadata();
+    if (const auto id = trailer.find("x-request-id"); id != trailer.end())
+      last_error_ =
+          absl::Status(last_error_.code(), absl::StrCat(last_error_.message(), " (request ",
+                                                        absl::string_view(id->second.data(), id->second.size()), ")"));
     if (call.status.error_code() == grpc::StatusCode::NOT_FOUND && pieces_.provide &&
         provided_ < kProvisions * connections_.size()) {
       ++provided_;
@@ -173,6 +181,7 @@ class Sender {
   const std::vector<Connection>& connections_;
   const ConnectOptions& options_;
   const Pieces& pieces_;
+  const std::string traceparent_;
   grpc::CompletionQueue queue_;
   std::vector<Call> calls_;
   std::vector<Server> servers_;  // of each connection

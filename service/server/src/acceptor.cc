@@ -7,9 +7,11 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace facetwise {
@@ -29,12 +31,32 @@ std::size_t most_connections(int wanted) {
 
 }  // namespace
 
+Connections::Connections(int most) : most_(most_connections(most)) {}
+
+void Connections::add(int file) {
+  struct stat status;
+  if (fstat(file, &status) != 0) return;
+  const std::lock_guard lock(mutex_);
+  accepted_.push_back({file, status.st_ino});
+}
+
+std::size_t Connections::count() const {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(accepted_, [](const Accepted& accepted) {
+    struct stat status;
+    return fstat(accepted.file, &status) != 0 || status.st_ino != accepted.inode;
+  });
+  return accepted_.size();
+}
+
 Acceptor::Acceptor(std::vector<Place> places, std::unique_ptr<ToGrpc> to_unix, std::unique_ptr<ToGrpc> to_tcp,
-                   int max_connections)
+                   std::vector<unsigned> users, Connections& connections, Log& log)
     : places_(std::move(places)),
       to_unix_(std::move(to_unix)),
       to_tcp_(std::move(to_tcp)),
-      most_(most_connections(max_connections)),
+      users_(std::move(users)),
+      connections_(connections),
+      log_(log),
       ends_(eventfd(0, EFD_CLOEXEC)),
       thread_([this] { accept_all(); }) {}
 
@@ -50,7 +72,7 @@ void Acceptor::accept_all() {
     poll(sockets.data(), room ? sockets.size() : 1, room ? -1 : kLookMs);
     if (sockets[0].revents != 0) return;
     if (!room) {
-      room = has_room();
+      room = connections_.count() < connections_.most();
       continue;
     }
     for (std::size_t k = 0; k < places_.size() && room; ++k)
@@ -59,13 +81,19 @@ void Acceptor::accept_all() {
 }
 
 bool Acceptor::accept_one(const Place& place) {
-  if (!has_room()) return false;
+  if (connections_.count() >= connections_.most()) {
+    log_.write_some(LogLevel::warning, "connections wait", {{"connections", connections_.most()}});
+    return false;
+  }
   const int file = accept4(place.socket.file(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (file < 0) return errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM;
   const int on = 1;
   setsockopt(file, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  struct stat status;
-  if (fstat(file, &status) == 0) accepted_.push_back({file, status.st_ino});
+  if (place.to == to_unix_.get() && !is_welcome(file)) {
+    close(file);
+    return true;
+  }
+  connections_.add(file);
   ToGrpc::NewConnectionParameters connection;
   connection.listener_fd = place.socket.file();
   connection.fd = file;
@@ -73,13 +101,14 @@ bool Acceptor::accept_one(const Place& place) {
   return true;
 }
 
-bool Acceptor::has_room() {
-  if (accepted_.size() < most_) return true;
-  std::erase_if(accepted_, [](const Accepted& accepted) {
-    struct stat status;
-    return fstat(accepted.file, &status) != 0 || status.st_ino != accepted.inode;
-  });
-  return accepted_.size() < most_;
+bool Acceptor::is_welcome(int file) const {
+  if (users_.empty()) return true;
+  ucred peer = {};
+  socklen_t size = sizeof peer;
+  const bool known = getsockopt(file, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+  if (known && std::find(users_.begin(), users_.end(), peer.uid) != users_.end()) return true;
+  log_.write_some(LogLevel::warning, "connection refused", {{"user", peer.uid}, {"process", peer.pid}});
+  return false;
 }
 
 }  // namespace facetwise

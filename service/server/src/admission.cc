@@ -1,6 +1,7 @@
 #include "src/admission.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -75,10 +76,9 @@ void Admission::Stay::hold_no_more_than(std::size_t bytes) {
 }
 
 void Admission::Stay::release() {
-  hold_no_more_than(0);
   const std::lock_guard lock(admission_.mutex_);
-  if (works_) --admission_.working_;
-  works_ = false;
+  admission_.bytes_ -= std::exchange(bytes_, 0);
+  if (std::exchange(works_, false)) --admission_.working_;
 }
 
 bool Admission::may_have_room(const Stay& stay) const {
@@ -175,9 +175,9 @@ void Admission::look() {
   }
 }
 
-int Admission::calls() const {
+Admission::Load Admission::load() const {
   const std::lock_guard lock(mutex_);
-  return open_;
+  return {working_, open_, bytes_};
 }
 
 void Admission::close() {

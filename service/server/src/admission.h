@@ -103,8 +103,13 @@ class Admission {
     std::list<Waiting*>::iterator entry_;
   };
 
-  // Calls that have not ended.
-  int calls() const;
+  // What is taken of the limits.
+  struct Load {
+    int working, open;
+    std::size_t bytes;
+  };
+  Load load() const;
+  std::size_t most_bytes() const { return most_bytes_; }
   // No more calls from now on.
   void close();
   bool closed() const;

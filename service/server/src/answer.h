@@ -9,7 +9,9 @@
 #include "absl/strings/string_view.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "src/admission.h"
+#include "src/call.h"
 #include "src/compute.h"
+#include "src/metrics.h"
 #include "src/tables.h"
 #include "src/task.h"
 
@@ -30,6 +32,8 @@ struct CallTools {
   Tables& tables;
   Admission::Stay& stay;
   const std::atomic<bool>& stop;  // the call is cancelled
+  Metrics& metrics;
+  CallFacts& facts;
 };
 
 // Both empty `request` once it is read. Errors begin with the field's name.

@@ -392,6 +392,12 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, c
   });
   co_await computed;
   if (!statistics.ok()) co_return statistics.status();
+  tools.facts.operation = view(name(decoder.operation()));
+  tools.facts.distribution = view(name(batch.model.distribution));
+  tools.facts.masking = view(name(batch.model.masking));
+  tools.facts.sampler = view(name(batch.sampler));
+  tools.facts.lanes += batch.lanes;
+  tools.metrics.computed(decoder.operation(), batch.model, batch.sampler, *statistics);
 
   v1::Statistics counts;
   counts.set_accepted(statistics->accepted);

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 
+#include "absl/strings/string_view.h"
 #include "grpcpp/server_context.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
@@ -13,6 +14,13 @@
 #include "src/task.h"
 
 namespace facetwise {
+
+// What of a call is told when it ends: what its last message asked for, and all messages together.
+struct CallFacts {
+  absl::string_view operation, distribution, masking, sampler;
+  std::uint64_t lanes = 0;
+  std::size_t received = 0, sent = 0;
+};
 
 class Call final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
@@ -32,6 +40,9 @@ class Call final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBu
 
   const grpc::CallbackServerContext& context() const { return context_; }
   Admission::Stay& stay() { return stay_; }
+  CallFacts& facts() { return facts_; }
+  // Adds to what the client gets at the call's end. Before that.
+  void add_trailer(const std::string& name, const std::string& value) { context_.AddTrailingMetadata(name, value); }
   // The client has gone, its deadline has passed, or it took too long.
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   const std::atomic<bool>& stop() const { return cancelled_; }
@@ -56,6 +67,7 @@ class Call final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBu
   grpc::CallbackServerContext& context_;
   const Limits limits_;
   Admission::Stay stay_;
+  CallFacts facts_;
   std::atomic<bool> cancelled_{false};
   grpc::ByteBuffer message_, last_;
   std::optional<Admission::Waiting> leaving_;

@@ -138,6 +138,7 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_compact(grpc::ByteBuffer& request,
   });
   co_await computed;
   if (!accepted.ok()) co_return accepted.status();
+  tools.facts.lanes += decoded.lanes;
 
   v1::CompactResponse small;
   small.set_accepted(*accepted);

@@ -1,10 +1,17 @@
 #include "src/sampler_service.h"
 
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
 #include "facetwise/slope_table.h"
 #include "grpcpp/impl/codegen/server_callback_handlers.h"
 #include "src/machine.h"
+#include "wire/fields.h"
 #include "wire/status.h"
 
 namespace facetwise {
@@ -46,10 +53,39 @@ ByteBuffer description(std::shared_ptr<const SlopeTable> table) {
   return serialise(info);
 }
 
+// Of what a client has sent with its call: a short text of visible characters, else empty.
+std::string metadata(const grpc::CallbackServerContext& context, const char* name) {
+  constexpr std::size_t kLongest = 64;
+  const auto found = context.client_metadata().find(name);
+  if (found == context.client_metadata().end()) return "";
+  const absl::string_view value(found->second.data(), found->second.size());
+  const bool good = value.size() <= kLongest && std::all_of(value.begin(), value.end(), absl::ascii_isgraph);
+  return good ? std::string(value) : "";
+}
+
+std::string random_name() {
+  std::random_device random;
+  return absl::StrCat(absl::Hex(random(), absl::kZeroPad8));
+}
+
+// What clients do wrong is news, no trouble of the server's.
+LogLevel level_of(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::OK: return LogLevel::debug;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+    case grpc::StatusCode::INTERNAL:
+    case grpc::StatusCode::UNKNOWN: return LogLevel::warning;
+    default: return LogLevel::info;
+  }
+}
+
 }  // namespace
 
-SamplerService::SamplerService(const ServerOptions& options)
+SamplerService::SamplerService(const ServerOptions& options, const Connections& connections, Log& log)
     : options_(options),
+      connections_(connections),
+      log_(log),
+      run_(random_name()),
       limits_{options.max_message_bytes},
       admission_({.calls = options.max_calls,
                   .open = options.max_open_calls,
@@ -58,51 +94,106 @@ SamplerService::SamplerService(const ServerOptions& options)
                   .patience = options.patience}),
       compute_(options.threads, options.execution),
       tables_(options.max_tables_bytes, options.table_idle_timeout),
-      tokens_(options.token_file) {
+      tokens_(options.token_file, log),
+      identity_(identify()),
+      metrics_(identity_, [this] { return load(); }) {
   const auto one = [this](Answer answer) { return [this, answer](Call& call) { return answer_one(answer, call); }; };
   const auto many = [this](Answer answer) { return [this, answer](Call& call) { return answer_many(answer, call); }; };
-  add("/facetwise.v1.Sampler/Run", one(with_tools(answer_batch)));
-  add("/facetwise.v1.Sampler/RunStream", many(with_tools(answer_batch)));
-  add("/facetwise.v1.Sampler/Compact", one(with_tools(answer_compact)));
-  add("/facetwise.v1.Sampler/CompactStream", many(with_tools(answer_compact)));
-  add("/facetwise.v1.Sampler/UploadTable", [this](Call& call) { return upload_table(call); });
-  add_small("/facetwise.v1.Sampler/ListTables", &SamplerService::list_tables);
-  add_small("/facetwise.v1.Sampler/DeleteTable", &SamplerService::delete_table);
-  add_small("/facetwise.v1.Sampler/Info", &SamplerService::info);
-  add("/facetwise.v1.Sampler/Benchmark", [this](Call& call) { return benchmark(call); });
+  add("Run", one(with_tools("Run", answer_batch)));
+  add("RunStream", many(with_tools("RunStream", answer_batch)));
+  add("Compact", one(with_tools("Compact", answer_compact)));
+  add("CompactStream", many(with_tools("CompactStream", answer_compact)));
+  add("UploadTable", [this](Call& call) { return upload_table(call); });
+  add_small("ListTables", &SamplerService::list_tables);
+  add_small("DeleteTable", &SamplerService::delete_table);
+  add_small("Info", &SamplerService::info);
+  add("Benchmark", [this](Call& call) { return benchmark(call); });
 }
 
 SamplerService::~SamplerService() {
   if (benchmark_thread_.joinable()) benchmark_thread_.join();
 }
 
-void SamplerService::add(const char* name, Call::Course course) {
+void SamplerService::add(const std::string& name, Call::Course course) {
   const auto admitted = [this, course](Call& call) -> Task<Call::End> {
     if (auto status = tokens_.check(call.context()); !status.ok()) co_return {to_grpc(status)};
     if (auto status = call.stay().enter(); !status.ok()) co_return {to_grpc(status)};
     auto rest = course(call);
     co_return co_await rest;
   };
-  AddMethod(new RpcServiceMethod(name, RpcMethod::BIDI_STREAMING, nullptr));
-  MarkMethodRawCallback(methods_++, new grpc::internal::CallbackBidiHandler<ByteBuffer, ByteBuffer>(
-                                        [this, admitted](grpc::CallbackServerContext* context) {
-                                          return new Call(*context, admission_, {options_.write_timeout}, admitted);
-                                        }));
+  const auto told = [this, admitted, name](Call& call) -> Task<Call::End> {
+    const auto begin = std::chrono::steady_clock::now();
+    auto rest = admitted(call);
+    auto end = co_await rest;
+    tell_end(name, call, end.status, std::chrono::steady_clock::now() - begin);
+    co_return end;
+  };
+  methods_.push_back(std::make_unique<std::string>("/facetwise.v1.Sampler/" + name));
+  AddMethod(new RpcServiceMethod(methods_.back()->c_str(), RpcMethod::BIDI_STREAMING, nullptr));
+  MarkMethodRawCallback(static_cast<int>(methods_.size()) - 1,
+                        new grpc::internal::CallbackBidiHandler<ByteBuffer, ByteBuffer>(
+                            [this, told](grpc::CallbackServerContext* context) {
+                              return new Call(*context, admission_, {options_.write_timeout}, told);
+                            }));
 }
 
-SamplerService::Answer SamplerService::with_tools(AnswerColumns answer) {
-  return [this, answer](ByteBuffer& request, Call& call) -> Task<absl::StatusOr<ByteBuffer>> {
-    const CallTools tools{limits_, compute_, tables_, call.stay(), call.stop()};
+void SamplerService::tell_end(const std::string& method, Call& call, const grpc::Status& status,
+                              std::chrono::duration<double> time) {
+  metrics_.call_ended(method, status.error_code());
+  const LogLevel level = level_of(status);
+  const bool logs = log_.takes(level);
+  if (status.ok() && !logs) return;
+  // The client's own name of the request, if it has one, so that both ends' logs can be put together.
+  std::string id = metadata(call.context(), "x-request-id");
+  if (id.empty()) id = absl::StrCat(run_, "-", named_.fetch_add(1, std::memory_order_relaxed));
+  if (!status.ok()) call.add_trailer("x-request-id", id);
+  if (!logs) return;
+  const CallFacts& facts = call.facts();
+  nlohmann::ordered_json fields = {
+      {"method", method},
+      {"code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code()))},
+      {"ms", std::round(time.count() * 1e6) / 1e3},
+      {"peer", call.context().peer()},
+      {"request_id", id}};
+  if (const std::string trace = metadata(call.context(), "traceparent"); !trace.empty()) fields["traceparent"] = trace;
+  for (const auto& [name, value] : {std::pair{"operation", facts.operation},
+                                    {"distribution", facts.distribution},
+                                    {"masking", facts.masking},
+                                    {"sampler", facts.sampler}})
+    if (!value.empty()) fields[name] = std::string(value);
+  for (const auto& [name, value] : {std::pair<const char*, std::uint64_t>{"lanes", facts.lanes},
+                                    {"received", facts.received},
+                                    {"sent", facts.sent}})
+    if (value > 0) fields[name] = value;
+  if (!status.ok()) fields["message"] = status.error_message();
+  if (status.ok())
+    log_.write(level, "call", fields);
+  else
+    log_.write_some(level, "call", fields);
+}
+
+SamplerService::Answer SamplerService::with_tools(const char* method, AnswerColumns answer) {
+  return [this, method, answer](ByteBuffer& request, Call& call) -> Task<absl::StatusOr<ByteBuffer>> {
+    const auto begin = std::chrono::steady_clock::now();
+    const std::size_t received = request.Length();
+    call.facts().received += received;
+    const CallTools tools{limits_, compute_, tables_, call.stay(), call.stop(), metrics_, call.facts()};
     auto answering = answer(request, tools);
     auto answered = co_await answering;
     // The request is no more.
-    call.stay().hold_no_more_than(answered.ok() ? answered->Length() : 0);
+    const std::size_t sent = answered.ok() ? answered->Length() : 0;
+    call.stay().hold_no_more_than(sent);
+    if (answered.ok()) {
+      call.facts().sent += sent;
+      metrics_.answered(method, std::chrono::steady_clock::now() - begin, received, sent);
+    }
     co_return answered;
   };
 }
 
 template <class Request, class Response>
-void SamplerService::add_small(const char* name, absl::Status (SamplerService::*answer)(const Request&, Response&)) {
+void SamplerService::add_small(const std::string& name,
+                               absl::Status (SamplerService::*answer)(const Request&, Response&)) {
   const Answer small = [this, answer](ByteBuffer& bytes, Call&) -> Task<absl::StatusOr<ByteBuffer>> {
     Request request;
     Response response;
@@ -204,16 +295,51 @@ absl::Status SamplerService::delete_table(const v1::DeleteTableRequest& request,
 }
 
 absl::Status SamplerService::info(const v1::InfoRequest&, v1::InfoResponse& response) {
-  const std::string_view release = version();
-  response.set_version(std::string(release));
-  response.set_target(std::string(name(resolve(compute_.execution().target).value_or(Target::best))));
-  for (const Target target : available_targets()) response.add_available_targets(std::string(name(target)));
-  response.set_threads(compute_.threads());
-  response.set_max_message_bytes(options_.max_message_bytes);
-  static const std::string cpu = cpu_name();
-  response.set_cpu(cpu);
-  response.set_benchmark_allowed(options_.allow_benchmark && options_.benchmark);
+  response = identity_;
+  *response.mutable_load() = load();
   return absl::OkStatus();
+}
+
+v1::InfoResponse SamplerService::identify() const {
+  v1::InfoResponse info;
+  info.set_version(std::string(version()));
+  info.set_target(std::string(name(resolve(compute_.execution().target).value_or(Target::best))));
+  for (const Target target : available_targets()) info.add_available_targets(std::string(name(target)));
+  info.set_threads(compute_.threads());
+  info.set_max_message_bytes(options_.max_message_bytes);
+  info.set_cpu(cpu_name());
+  info.set_benchmark_allowed(options_.allow_benchmark && options_.benchmark);
+  v1::ServerLimits& limits = *info.mutable_limits();
+  limits.set_calls(options_.max_calls);
+  limits.set_open_calls(options_.max_open_calls);
+  limits.set_held_bytes(admission_.most_bytes());
+  limits.set_connections(connections_.most());
+  limits.set_table_bytes(tables_.max_bytes());
+  limits.set_lanes(limits_.lanes());
+  std::vector<Model> models = all_models();
+  for (const Masking masking : {Masking::smith, Masking::vcavity})
+    models.push_back({.distribution = Distribution::table, .masking = masking});
+  for (const Model& model : models) {
+    v1::ModelInfo& its = *info.add_models();
+    its.set_distribution(wire::to_proto(model.distribution));
+    its.set_masking(wire::to_proto(model.masking));
+    for (const Sampler sampler : samplers_for(Operation::sample_reflection, model))
+      its.add_samplers(wire::to_proto(sampler));
+  }
+  return info;
+}
+
+v1::ServerLoad SamplerService::load() const {
+  v1::ServerLoad load;
+  const Admission::Load calls = admission_.load();
+  load.set_calls(calls.working);
+  load.set_open_calls(calls.open);
+  load.set_held_bytes(calls.bytes);
+  load.set_connections(connections_.count());
+  load.set_table_bytes(tables_.bytes());
+  load.set_lanes(metrics_.lanes());
+  load.set_uptime_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count());
+  return load;
 }
 
 Task<Call::End> SamplerService::benchmark(Call& call) {

@@ -11,10 +11,13 @@
 #include "grpcpp/impl/codegen/proto_utils.h"
 #include "grpcpp/impl/service_type.h"
 #include "grpcpp/support/byte_buffer.h"
+#include "src/acceptor.h"
 #include "src/admission.h"
 #include "src/answer.h"
 #include "src/call.h"
 #include "src/compute.h"
+#include "src/log.h"
+#include "src/metrics.h"
 #include "src/tables.h"
 #include "src/task.h"
 #include "src/tokens.h"
@@ -26,23 +29,29 @@ namespace facetwise {
 // place.
 class SamplerService final : public grpc::Service {
  public:
-  explicit SamplerService(const ServerOptions& options);
+  // `connections` and `log` must outlive it.
+  SamplerService(const ServerOptions& options, const Connections& connections, Log& log);
   ~SamplerService() override;
 
   // Before the first call. Error: the file of tokens, and why.
   absl::Status read_tokens() { return tokens_.read(); }
   Admission& admission() { return admission_; }
+  Metrics& metrics() { return metrics_; }
+  // What it is and may hold.
+  const v1::InfoResponse& identity() const { return identity_; }
 
  private:
   using Answer = std::function<Task<absl::StatusOr<grpc::ByteBuffer>>(grpc::ByteBuffer& request, Call& call)>;
   using AnswerColumns = Task<absl::StatusOr<grpc::ByteBuffer>> (*)(grpc::ByteBuffer&, const CallTools&);
 
-  // After the caller's token has been checked and the call is admitted.
-  void add(const char* name, Call::Course course);
-  Answer with_tools(AnswerColumns answer);
+  // After the caller's token has been checked and the call is admitted. By the method's name.
+  void add(const std::string& name, Call::Course course);
+  Answer with_tools(const char* method, AnswerColumns answer);
+  // Counts the call, and logs it.
+  void tell_end(const std::string& method, Call& call, const grpc::Status& status, std::chrono::duration<double> time);
   // Of generated messages, one each way.
   template <class Request, class Response>
-  void add_small(const char* name, absl::Status (SamplerService::*answer)(const Request&, Response&));
+  void add_small(const std::string& name, absl::Status (SamplerService::*answer)(const Request&, Response&));
 
   // Of a call that takes one.
   Task<absl::StatusOr<grpc::ByteBuffer>> read_one(Call& call);
@@ -53,14 +62,23 @@ class SamplerService final : public grpc::Service {
   absl::Status list_tables(const v1::ListTablesRequest& request, v1::ListTablesResponse& response);
   absl::Status delete_table(const v1::DeleteTableRequest& request, v1::DeleteTableResponse& response);
   absl::Status info(const v1::InfoRequest& request, v1::InfoResponse& response);
+  v1::InfoResponse identify() const;
+  v1::ServerLoad load() const;
 
   const ServerOptions options_;
+  const Connections& connections_;
+  Log& log_;
+  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
+  const std::string run_;  // names this run of the server, in request ids
+  std::atomic<std::uint64_t> named_{0};
   const Limits limits_;
   Admission admission_;
   Compute compute_;
   Tables tables_;
   Tokens tokens_;
-  int methods_ = 0;
+  const v1::InfoResponse identity_;
+  Metrics metrics_;
+  std::vector<std::unique_ptr<std::string>> methods_;  // their paths
   std::atomic<bool> benchmark_runs_{false};
   std::mutex benchmark_mutex_;  // of the next
   std::thread benchmark_thread_;

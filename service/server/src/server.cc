@@ -1,7 +1,10 @@
 #include "facetwise/server.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 
@@ -32,6 +35,14 @@ absl::Status check_options(const ServerOptions& options) {
   for (const std::string& address : options.listen)
     if (auto status = check_address(address, options.insecure || !options.tls_certificate.empty()); !status.ok())
       return status;
+  if (!options.metrics.empty()) {
+    if (!unix_path(options.metrics).empty() || !check_address(options.metrics, true).ok())
+      return invalid(absl::StrCat("metrics: \"", options.metrics, "\" is not IP:PORT"));
+    if (!options.insecure && !check_address(options.metrics, false).ok())
+      return invalid(absl::StrCat("metrics: ", options.metrics,
+                                  " is open to the network, and has no TLS: say that it may be (--insecure), or give "
+                                  "127.0.0.1"));
+  }
   if (auto status = check_tls(options); !status.ok()) return status;
   if (options.unix_mode > 0777) return invalid("unix_mode: not permissions");
   if (options.threads < 0) return invalid("threads: below 0");
@@ -51,12 +62,17 @@ absl::Status check_options(const ServerOptions& options) {
 
 class GrpcServer final : public Server {
  public:
-  explicit GrpcServer(const ServerOptions& options) : options_(options), service_(options) {}
+  explicit GrpcServer(const ServerOptions& options)
+      : options_(options),
+        log_(options.log, options.log_level),
+        connections_(options.max_connections),
+        service_(options, connections_, log_) {}
   ~GrpcServer() override { drain(); }
 
   absl::Status listen();
 
   std::span<const std::string> addresses() const override { return addresses_; }
+  const std::string& metrics() const override { return metrics_; }
   void wait() override {
     server_->Wait();
     const std::lock_guard lock(drain_mutex_);
@@ -65,9 +81,12 @@ class GrpcServer final : public Server {
 
  private:
   const ServerOptions options_;
+  Log log_;
+  Connections connections_;
   SamplerService service_;
   std::vector<SocketLock> sockets_;
   std::vector<std::string> addresses_;
+  std::string metrics_;
   std::mutex drain_mutex_;
   bool drained_ = false;
   std::unique_ptr<grpc::Server> server_;
@@ -122,8 +141,21 @@ absl::Status GrpcServer::listen() {
   }
   server_ = builder.BuildAndStart();
   if (!server_) return absl::UnavailableError("listen: the server could not start");
-  acceptor_.emplace(std::move(places), std::move(to_unix), std::move(to_tcp), options_.max_connections);
+  if (!options_.metrics.empty()) {
+    auto listening = service_.metrics().listen(options_.metrics);
+    if (!listening.ok()) return listening.status();
+    metrics_ = *std::move(listening);
+  }
+  acceptor_.emplace(std::move(places), std::move(to_unix), std::move(to_tcp), options_.unix_users, connections_, log_);
   server_->GetHealthCheckService()->SetServingStatus("facetwise.v1.Sampler", true);
+  const v1::InfoResponse& info = service_.identity();
+  log_.write(LogLevel::info, "serves",
+             {{"version", info.version()},
+              {"process", getpid()},
+              {"target", info.target()},
+              {"threads", info.threads()},
+              {"addresses", addresses_},
+              {"metrics", metrics_}});
   return absl::OkStatus();
 }
 
@@ -132,6 +164,7 @@ void GrpcServer::drain() {
   if (drained_ || !server_) return;
   drained_ = true;
   const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
+  log_.write(LogLevel::info, "drains", {{"calls", service_.admission().load().open}});
   server_->GetHealthCheckService()->SetServingStatus(false);
   // Those who watch the health go elsewhere meanwhile, instead of being refused.
   std::this_thread::sleep_for(options_.drain_pause);
@@ -141,10 +174,12 @@ void GrpcServer::drain() {
   service_.admission().wait_until_idle(until);
   std::this_thread::sleep_for(kPause);
   service_.admission().wait_until_idle(until);
-  const bool idle = service_.admission().calls() == 0;
+  const int left = service_.admission().load().open;
+  if (left > 0) log_.write(LogLevel::warning, "ends calls", {{"calls", left}});
   acceptor_.reset();
-  server_->Shutdown(std::chrono::system_clock::now() + (idle ? kLinger : std::chrono::milliseconds(0)));
+  server_->Shutdown(std::chrono::system_clock::now() + (left == 0 ? kLinger : std::chrono::milliseconds(0)));
   sockets_.clear();
+  log_.write(LogLevel::info, "ended", {{"lanes", service_.metrics().lanes()}});
 }
 
 }  // namespace

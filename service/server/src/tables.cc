@@ -43,6 +43,11 @@ std::vector<Tables::Entry> Tables::list() {
   return entries;
 }
 
+std::size_t Tables::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
 Tables::Map::iterator Tables::drop(Map::iterator at) {
   bytes_ -= at->second.table->bytes();
   // What was made of it goes too: else a client could fill the memory table by table.

@@ -29,6 +29,7 @@ class Tables {
     std::chrono::duration<double> idle;
   };
   std::vector<Entry> list();
+  std::size_t bytes() const;
 
   std::size_t max_bytes() const { return max_bytes_; }
   std::chrono::milliseconds max_idle() const { return max_idle_; }
@@ -45,7 +46,7 @@ class Tables {
 
   const std::size_t max_bytes_;
   const std::chrono::milliseconds max_idle_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   Map kept_;
   std::size_t bytes_ = 0;
 };

@@ -2,7 +2,7 @@
 
 #include <openssl/crypto.h>
 
-#include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
@@ -41,7 +41,9 @@ void Tokens::read_if_changed() {
     return;
   if (const auto status = read(); !status.ok()) {
     seen_ = there;
-    std::fprintf(stderr, "facetwise: %s; the tokens stay as they were\n", std::string(status.message()).c_str());
+    log_.write(LogLevel::warning, "tokens stay as they were", {{"why", std::string(status.message())}});
+  } else {
+    log_.write(LogLevel::info, "tokens read again", {{"tokens", tokens_.size()}});
   }
 }
 

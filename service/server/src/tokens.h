@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "grpcpp/server_context.h"
+#include "src/log.h"
 
 namespace facetwise {
 
@@ -17,7 +18,7 @@ namespace facetwise {
 class Tokens {
  public:
   // Without a path every call is allowed.
-  explicit Tokens(std::string path) : path_(std::move(path)) {}
+  Tokens(std::string path, Log& log) : path_(std::move(path)), log_(log) {}
   // Error: the file, and why.
   absl::Status read();
 
@@ -28,6 +29,7 @@ class Tokens {
   void read_if_changed();
 
   const std::string path_;
+  Log& log_;
   std::mutex mutex_;
   std::vector<std::string> tokens_;
   struct stat seen_ {};

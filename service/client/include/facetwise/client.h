@@ -31,6 +31,9 @@ struct ConnectOptions {
   // A file whose first line is the token that the server asks for (server.h). Refused where it would cross a network
   // without TLS.
   std::string token_file{};
+  // Called once a batch, on the thread that asks for it: the W3C trace context ("00-...") that its calls belong to, which
+  // servers write to their logs. Empty: none.
+  std::function<std::string()> traceparent{};
   // Called by connect() for each server that does not answer while another does, with what may be printed: which, and why.
   std::function<void(const std::string& message)> absent{};
 };
@@ -42,8 +45,8 @@ struct ConnectOptions {
 //
 // The engine's calls return what the local engine's do. A malformed call gets the same error, from checks
 // made here, before anything is sent or written. A call also fails when no server answers for connect_timeout, or one says
-// that it never will: the error begins with "server ADDRESS:", and outputs of pieces that were answered before it are
-// written. Several threads may use one engine. A program that moves much data should call tune_malloc() at its start.
+// that it never will: the error begins with "server ADDRESS:" and names the request as the server's log does, and outputs
+// of pieces that were answered before it are written. Several threads may use one engine. A program that moves much data should call tune_malloc() at its start.
 absl::StatusOr<std::unique_ptr<Engine>> connect(std::span<const std::string> addresses,
                                                 const ConnectOptions& options = {});
 

@@ -25,6 +25,11 @@ namespace facetwise {
 using BenchmarkReport = std::function<bool(const v1::BenchmarkProgress&)>;
 using BenchmarkRunner = std::function<absl::Status(const v1::BenchmarkRequest&, const BenchmarkReport&)>;
 
+// What a server writes to standard error of its life, of calls that fail and (debug) of each call: a line an event, as
+// name=value or as a JSON object.
+enum class LogFormat { none, text, json };
+enum class LogLevel { debug, info, warning };
+
 struct ServerOptions {
   // Where to listen: "unix:PATH" or "HOST:PORT", one or more. Port 0 takes a free one: see addresses(). Hosts other than
   // this machine's loopback (127.*, localhost, [::1]) are refused without TLS, unless `insecure`.
@@ -40,6 +45,13 @@ struct ServerOptions {
   std::string token_file;
   // Permissions of Unix sockets. Who may write to the socket may call.
   unsigned unix_mode = 0600;
+  // Ids of the users whose processes may connect to Unix sockets, as the system tells them; empty: all that may write there.
+  std::vector<unsigned> unix_users;
+  // IP:PORT that gives what is counted at http://IP:PORT/metrics, for Prometheus, without TLS or token: of this machine's
+  // loopback, unless `insecure`. Empty: nowhere.
+  std::string metrics;
+  LogFormat log = LogFormat::none;
+  LogLevel log_level = LogLevel::info;
   // Threads that compute; 0: as many as the machine has.
   int threads = 0;
   // Largest request that is read and largest response that is made. A call's lanes are at most a quarter of
@@ -82,6 +94,8 @@ class Server {
 
   // The addresses that it listens on, as clients name them: port 0 replaced by the one taken.
   virtual std::span<const std::string> addresses() const = 0;
+  // The same of `metrics`; empty: it gives none.
+  virtual const std::string& metrics() const = 0;
   // Returns when the server has drained.
   virtual void wait() = 0;
   // Health says NOT_SERVING; after drain_pause no new calls are taken, those in flight finish (until drain_timeout, then
