@@ -82,7 +82,8 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
                 {"connections", load.connections()},
                 {"table_bytes", load.table_bytes()},
                 {"lanes", load.lanes()},
-                {"uptime_seconds", load.uptime_seconds()}}}};
+                {"uptime_seconds", load.uptime_seconds()},
+                {"serving", load.serving()}}}};
 }
 
 void print(const Json& info) {

@@ -9,7 +9,8 @@
 Every operation is a method, and takes the library's fields by name (facetwise/batch.h says what they mean, their units and
 ranges): `incident` and `outgoing` as three columns or one array (N, 3), `alpha_x`, `alpha_y`, `eta`, `f0`, `u1`, `u2`, `u3`,
 `mean_slope_x` ... A column is an array of N values or one number for all lanes. float32 arrays are read where they lie, strided
-ones too; what else NumPy can turn into them is copied. `model` has the parts of a model (facetwise/model.h) by name.
+ones too; what else NumPy can turn into them is copied. Of dask arrays the outputs are dask arrays with the same chunks, whose
+bits do not depend on the chunks; engines, models and tables can be sent to dask's workers. `model` has the parts of a model (facetwise/model.h) by name.
 
 It speaks to libfacetwise.so (facetwise.h): of FACETWISE_LIBRARY if that is set, beside this file, or installed.
 """
@@ -19,7 +20,10 @@ import ctypes
 import ctypes.util
 import os
 import pathlib
+import sys
+import tempfile
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Callable, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
@@ -132,8 +136,21 @@ class SlopeTable:
     def save(self, path: Union[str, os.PathLike]) -> None:
         _check(_library.fw_table_save(self._handle, os.fsencode(path)))
 
+    def __reduce__(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder, "table")
+            self.save(path)
+            return _table_of, (path.read_bytes(),)
+
     def __del__(self):
         _library.fw_table_destroy(self._handle)
+
+
+def _table_of(saved: bytes) -> SlopeTable:
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder, "table")
+        path.write_bytes(saved)
+        return SlopeTable.load(path)
 
 
 @dataclass(frozen=True)
@@ -203,11 +220,27 @@ def _column(values: Values, name: str) -> Union[float, Array]:
     return array if array.strides[0] > 0 and array.strides[0] % 4 == 0 and array.flags.aligned else array.copy()
 
 
+def _writes(array: Array) -> bool:
+    return array.flags.writeable and (array.size == 0 or array.strides[0] > 0)
+
+
+def _has_dask_arrays(ids: object, fields: Mapping[str, object]) -> bool:
+    module = sys.modules.get("dask.array")
+    if module is None:
+        return False
+    parts = [part for values in fields.values() for part in (values if isinstance(values, (tuple, list)) else (values,))]
+    return any(isinstance(part, module.Array) for part in [ids, *parts])
+
+
 class Engine:
     """The library's calls, on this machine or on servers. Any number of threads may use one: calls let others run."""
 
-    def __init__(self, handle: int):
+    def __init__(self, handle: int, recipe: tuple):
         self._handle = handle
+        self._recipe = recipe  # how another process makes its own
+
+    def __reduce__(self):
+        return _engine_of, self._recipe
 
     def __del__(self):
         _library.fw_engine_destroy(self._handle)
@@ -223,6 +256,13 @@ class Engine:
         many, where all columns are numbers. outputs: names without "out."; out: arrays that are written instead of new ones.
         Raises Error with the field's name where the call makes no sense; bad lanes get a status, no error.
         """
+        outputs = _OUTPUTS.get(operation, ()) if outputs is None else outputs
+        if _has_dask_arrays(ids, fields):
+            from . import dask_arrays
+            if active is not None or out is not None:
+                raise ValueError("active, out: not with dask arrays")
+            return dask_arrays.run(self, operation, fields, model=model, sampler=sampler, seed=seed, dimension=dimension, ids=ids,
+                                   first_id=first_id, lanes=lanes, outputs=outputs)
         columns: dict[str, Union[float, Array]] = {}
         for name, values in fields.items():
             if name not in _DIRECTIONS:
@@ -262,7 +302,7 @@ class Engine:
                 active = np.ascontiguousarray(active, dtype=np.uint32)
                 _check(_library.fw_set_active(batch, active.ctypes.data, active.size))
             made: dict[str, Array] = {}
-            for name in outputs if outputs is not None else _OUTPUTS.get(operation, ()):
+            for name in outputs:
                 made[name] = self._output(batch, name, count, (out or {}).get(name))
             statistics = Statistics()
             _check(_library.fw_run(self._handle, operation.encode(), batch, ctypes.byref(statistics)))
@@ -276,14 +316,14 @@ class Engine:
         if name in _DIRECTIONS:
             # Columns side by side, seen as (N, 3).
             array = given if given is not None else np.zeros((3, count), np.float32).T
-            if array.shape != (count, 3) or array.dtype != np.float32 or not array.flags.writeable or array.strides[0] <= 0:
+            if array.shape != (count, 3) or array.dtype != np.float32 or not _writes(array):
                 raise ValueError(f"{name}: an array ({count}, 3) of float32 is needed")
             for k, axis in enumerate("xyz"):
                 part = array[:, k]
                 _check(_library.fw_set_output(batch, f"out.{name}.{axis}".encode(), part.ctypes.data, part.strides[0]))
             return array
         array = given if given is not None else np.zeros(count, kind)
-        if array.shape != (count,) or array.dtype != kind or not array.flags.writeable or array.strides[0] <= 0:
+        if array.shape != (count,) or array.dtype != kind or not _writes(array):
             raise ValueError(f"{name}: {count} values of {np.dtype(kind)} are needed, which may be written")
         setter = _library.fw_set_byte_output if name in _BYTES else _library.fw_set_output
         _check(setter(batch, f"out.{name}".encode(), array.ctypes.data, array.strides[0]))
@@ -305,7 +345,7 @@ for _operation in _OUTPUTS:
 
 def local(target: Optional[str] = None) -> Engine:
     """This machine's engine. target: an instruction set, "best", "scalar", "avx2", "avx3" or "neon"."""
-    return Engine(_handle(_library.fw_local(target.encode() if target else None)))
+    return Engine(_handle(_library.fw_local(target.encode() if target else None)), ("local", (), (("target", target),)))
 
 
 def connect(*addresses: str, tls_ca: Optional[str] = None, tls_certificate: Optional[str] = None,
@@ -314,4 +354,12 @@ def connect(*addresses: str, tls_ca: Optional[str] = None, tls_certificate: Opti
     encoded = (ctypes.c_char_p * len(addresses))(*(address.encode() for address in addresses))
     options = _Connection(*(None if value is None else os.fsencode(value)
                             for value in (tls_ca, tls_certificate, tls_key, tls_name, token_file)))
-    return Engine(_handle(_library.fw_connect(encoded, len(addresses), ctypes.byref(options))))
+    recipe = ("connect", addresses, (("tls_ca", tls_ca), ("tls_certificate", tls_certificate), ("tls_key", tls_key),
+                                     ("tls_name", tls_name), ("token_file", token_file)))
+    return Engine(_handle(_library.fw_connect(encoded, len(addresses), ctypes.byref(options))), recipe)
+
+
+@lru_cache(maxsize=16)
+def _engine_of(maker: str, arguments: tuple, options: tuple) -> Engine:
+    """For a process that was sent an engine: its own of the same kind, made once."""
+    return {"local": local, "connect": connect}[maker](*arguments, **dict(options))

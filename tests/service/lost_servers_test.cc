@@ -1,9 +1,13 @@
 // Servers that are absent, killed, stopped, drained or busy: a batch is answered as long as one is there, completely, once and
 // right.
 #include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "facetwise/client.h"
@@ -150,6 +154,78 @@ TEST_F(LostServers, AllOfThemAreAnErrorThatNamesOne) {
   const Answer answer = computed(*engine);
   EXPECT_EQ(answer.statistics.status().code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(answer.statistics.status().message().rfind("server unix:", 0), 0u) << answer.statistics.status();
+}
+
+// HAProxy with the configuration that we give, for these addresses.
+class Proxy {
+ public:
+  Proxy(const testing::TemporaryFolder& folder, const std::vector<std::unique_ptr<ServerProcess>>& servers)
+      : address_("unix:" + folder.path("proxy")) {
+    std::ifstream given(FACETWISE_HAPROXY);
+    std::string text{std::istreambuf_iterator<char>(given), {}};
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      const auto at = text.find(from);
+      ASSERT_NE(at, std::string::npos) << from;
+      text.replace(at, from.size(), to);
+    };
+    replace("bind 0.0.0.0:7777 proto", "bind unix@" + folder.path("proxy") + " proto");
+    for (std::size_t n = 0; n < servers.size(); ++n) {
+      const auto& addresses = servers[n]->addresses();
+      const std::string metrics_port = addresses.at(1).substr(addresses[1].rfind(':') + 1);
+      replace(" render" + std::to_string(n + 1) + ":7777", " " + addresses[0] + " port " + metrics_port);
+    }
+    const std::string file = folder.path("haproxy.cfg");
+    std::ofstream(file) << text;
+    const pid_t parent = getpid();
+    process_ = fork();
+    if (process_ != 0) return;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() == parent) execl("/usr/sbin/haproxy", "haproxy", "-q", "-db", "-f", file.c_str(), nullptr);
+    _exit(127);
+  }
+  ~Proxy() {
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+  }
+  Proxy(const Proxy&) = delete;
+  Proxy& operator=(const Proxy&) = delete;
+  const std::string& address() const { return address_; }
+
+ private:
+  const std::string address_;
+  pid_t process_ = -1;
+};
+
+TEST_F(LostServers, BehindAProxyAreReplacedToo) {
+  const auto tcp_server = [](const std::string& address, const std::string& metrics) {
+    return std::make_unique<ServerProcess>(
+        std::vector<std::string>{"--listen", address, "--metrics", metrics, "--drain-ms", "2000", "--pause-ms", "500"});
+  };
+  std::vector<std::unique_ptr<ServerProcess>> servers;
+  for (int n = 0; n < 3; ++n) servers.push_back(tcp_server("127.0.0.1:0", "127.0.0.1:0"));
+  const Proxy proxy(folder_, servers);
+  ConnectOptions options;
+  options.piece_bytes = 100'000;
+  options.window = 6;
+  options.connect_timeout = 20s;
+  const auto engine = connect(std::span(&proxy.address(), 1), options);
+  ASSERT_TRUE(engine.ok()) << engine.status();
+  expect_equal(**engine);
+  std::atomic<bool> ends = false;
+  std::atomic<int> kills = 0;
+  std::thread killer([&] {
+    for (int n = 0; !ends; n = (n + 1) % 3) {
+      usleep(300000);
+      servers[n]->signal(kills % 2 == 0 ? SIGKILL : SIGTERM);
+      servers[n]->wait();
+      const std::vector<std::string> addresses = servers[n]->addresses();
+      servers[n] = tcp_server(addresses[0], addresses[1]);
+      ++kills;
+    }
+  });
+  while (kills < 8 && !HasFailure()) expect_equal(**engine);
+  ends = true;
+  killer.join();
 }
 
 }  // namespace

@@ -42,6 +42,7 @@ class Metrics::Gauges final : public prometheus::Collectable {
     };
     add("facetwise_info", "1; the labels say what the server is", 1,
         {{"version", info_.version()}, {"target", info_.target()}, {"cpu", info_.cpu()}});
+    add("facetwise_serving", "1; 0 as soon as it drains", load.serving() ? 1 : 0);
     add("facetwise_threads", "Threads that compute", info_.threads());
     add("facetwise_uptime_seconds", "Since the start", load.uptime_seconds());
     add_limited("facetwise_calls_working", "Calls that are worked on, until their answers have left", load.calls(),

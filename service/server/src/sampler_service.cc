@@ -338,6 +338,7 @@ v1::ServerLoad SamplerService::load() const {
   load.set_connections(connections_.count());
   load.set_table_bytes(tables_.bytes());
   load.set_lanes(metrics_.lanes());
+  load.set_serving(serving_);
   load.set_uptime_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count());
   return load;
 }

@@ -37,6 +37,8 @@ class SamplerService final : public grpc::Service {
   absl::Status read_tokens() { return tokens_.read(); }
   Admission& admission() { return admission_; }
   Metrics& metrics() { return metrics_; }
+  // Tells from now on that it serves no more; calls are still taken.
+  void begin_drain() { serving_ = false; }
   // What it is and may hold.
   const v1::InfoResponse& identity() const { return identity_; }
 
@@ -79,7 +81,7 @@ class SamplerService final : public grpc::Service {
   const v1::InfoResponse identity_;
   Metrics metrics_;
   std::vector<std::unique_ptr<std::string>> methods_;  // their paths
-  std::atomic<bool> benchmark_runs_{false};
+  std::atomic<bool> serving_{true}, benchmark_runs_{false};
   std::mutex benchmark_mutex_;  // of the next
   std::thread benchmark_thread_;
 };

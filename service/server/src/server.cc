@@ -165,6 +165,7 @@ void GrpcServer::drain() {
   drained_ = true;
   const auto until = std::chrono::steady_clock::now() + options_.drain_timeout;
   log_.write(LogLevel::info, "drains", {{"calls", service_.admission().load().open}});
+  service_.begin_drain();
   server_->GetHealthCheckService()->SetServingStatus(false);
   // Those who watch the health go elsewhere meanwhile, instead of being refused.
   std::this_thread::sleep_for(options_.drain_pause);
