@@ -31,9 +31,18 @@ struct Call {
   bool in_flight = false;
 };
 
+// How the server's log names a call that failed. Empty: the server has not said how it ended, but the way to it.
+std::string request_id(const grpc::ClientContext& context) {
+  const auto& trailer = context.GetServerTrailingMetadata();
+  const auto id = trailer.find("x-request-id");
+  return id == trailer.end() ? "" : std::string(id->second.data(), id->second.size());
+}
+
 // How long to wait before this server is asked again. Nothing: it would give the same answer.
-std::optional<milliseconds> rest_after(const grpc::Status& status) {
+std::optional<milliseconds> rest_after(const grpc::Status& status, bool said_by_server) {
   switch (status.error_code()) {
+    case grpc::StatusCode::UNKNOWN:  // a proxy's server was lost in the middle of an answer
+    case grpc::StatusCode::INTERNAL: return said_by_server ? std::nullopt : std::optional(milliseconds(100));
     case grpc::StatusCode::UNAVAILABLE:        // not there, or shutting down
     case grpc::StatusCode::DEADLINE_EXCEEDED:  // there, but does not answer
     case grpc::StatusCode::CANCELLED:          // it wanted the place: the call's own cancelling ends the batch
@@ -159,18 +168,15 @@ class Sender {
                          : absl::Status(status.code(), absl::StrCat("server ", address, ": ", status.message()));
     }
     last_error_ = wire::from_grpc(call.status, address);
-    // As the server's log names it.
-    const auto& trailer = call.context->GetServerTrailingMetadata();
-    if (const auto id = trailer.find("x-request-id"); id != trailer.end())
-      last_error_ =
-          absl::Status(last_error_.code(), absl::StrCat(last_error_.message(), " (request ",
-                                                        absl::string_view(id->second.data(), id->second.size()), ")"));
+    const std::string id = request_id(*call.context);
+    if (!id.empty())
+      last_error_ = absl::Status(last_error_.code(), absl::StrCat(last_error_.message(), " (request ", id, ")"));
     if (call.status.error_code() == grpc::StatusCode::NOT_FOUND && pieces_.provide &&
         provided_ < kProvisions * connections_.size()) {
       ++provided_;
       if (auto status = pieces_.provide(connections_[call.connection].channel); !status.ok()) return status;
     } else {
-      const auto rest = rest_after(call.status);
+      const auto rest = rest_after(call.status, !id.empty());
       if (!rest) return last_error_;
       server.rests_until = Clock::now() + *rest;
     }
