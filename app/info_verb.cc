@@ -74,7 +74,8 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
                 {"held_bytes", limits.held_bytes()},
                 {"connections", limits.connections()},
                 {"table_bytes", limits.table_bytes()},
-                {"lanes", limits.lanes()}}},
+                {"lanes", limits.lanes()},
+                {"shared_bytes", limits.shared_bytes()}}},
               {"load",
                {{"calls", load.calls()},
                 {"open_calls", load.open_calls()},
@@ -82,6 +83,7 @@ absl::StatusOr<Json> remote_info(const std::string& address, const ConnectOption
                 {"connections", load.connections()},
                 {"table_bytes", load.table_bytes()},
                 {"lanes", load.lanes()},
+                {"shared_bytes", load.shared_bytes()},
                 {"uptime_seconds", load.uptime_seconds()},
                 {"serving", load.serving()}}}};
 }

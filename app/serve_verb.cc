@@ -49,7 +49,7 @@ std::optional<LogLevel> parse_level(std::string_view name) {
 struct ServeVerb {
   ServerOptions options;
   std::size_t max_message_mib = 16, max_mib_in_flight = 4096;
-  std::size_t max_tables_mib = 256;
+  std::size_t max_tables_mib = 256, shared_memory_mib = 0;
   int drain_seconds = 10, read_seconds = 20, write_seconds = 60, patience_ms = 2000, stream_idle_seconds = 300,
       table_idle_seconds = 3600;
   std::string unix_mode = "0600", config;
@@ -68,6 +68,7 @@ struct ServeVerb {
     options.stream_idle_timeout = std::chrono::seconds(stream_idle_seconds);
     options.max_bytes_in_flight = max_mib_in_flight * kMiB;
     options.max_tables_bytes = max_tables_mib * kMiB;
+    options.max_shared_bytes = shared_memory_mib * kMiB;
     options.max_table_bytes = std::min(options.max_table_bytes, options.max_tables_bytes);
     options.table_idle_timeout = std::chrono::seconds(table_idle_seconds);
     options.drain_timeout = std::chrono::seconds(drain_seconds);
@@ -178,6 +179,9 @@ Examples:
              "The same waits where others are refused or wait for room; default 2000");
   add_number("--max-tables-mib", arguments->max_tables_mib, 1, 1 << 20,
              "Tables of slopes that clients upload, together; default 256");
+  add_number("--shared-memory-mib", arguments->shared_memory_mib, 0, 1 << 24,
+             "Memory that clients on this machine may share with the server instead of sending columns, all together; "
+             "default 0: none");
   add_number("--table-idle-seconds", arguments->table_idle_seconds, 1, 1 << 30,
              "How long a table stays that nobody uses; default 3600");
   const auto add_file = [&](const char* flag, std::string& file, const char* help) {

@@ -36,4 +36,7 @@ ColumnMemory::ColumnMemory(std::size_t columns, std::size_t lanes)
 #endif
 }
 
+ColumnMemory::ColumnMemory(void* memory, std::size_t columns, std::size_t lanes)
+    : columns_(columns), lanes_(lanes), stride_(stride_of(lanes)), data_(static_cast<float*>(memory), Free{false}) {}
+
 }  // namespace facetwise

@@ -34,6 +34,8 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   static Compute compute(1, {});
   static Tables tables(0, {});
   static Metrics metrics({}, [] { return v1::ServerLoad(); });
+  static Log log(LogFormat::none, LogLevel::warning);
+  static const SharedRegions regions(0, {}, log);
   static const std::atomic<bool> stop{false};
   static Admission admission({8, 8, 64 * kMessageBytes, kMessageBytes, std::chrono::milliseconds(1000)});
   static const bool ready = [] {
@@ -51,7 +53,7 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   Admission::Stay stay(
       admission, [] {}, "");
   CallFacts facts;
-  const CallTools tools{{kMessageBytes}, compute, tables, stay, stop, metrics, facts};
+  const CallTools tools{{kMessageBytes}, compute, tables, regions, stay, stop, metrics, facts};
   const auto answered = wait_for(answer(request, tools));
   // What is too much or malformed is refused; nothing else goes wrong.
   if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&

@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
   app.add_option("--unix-mode", options.unix_mode);
   app.add_option("--unix-user", options.unix_users);
   app.add_option("--metrics", options.metrics);
+  app.add_option("--max-shared-bytes", options.max_shared_bytes);
   bool logs = false;
   app.add_flag("--log", logs, "each call, as JSON");
   app.add_flag("--allow-benchmark", options.allow_benchmark);

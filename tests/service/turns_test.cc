@@ -52,6 +52,47 @@ TEST(Turns, EndWhereACallNeedsNoMore) {
   EXPECT_EQ(seen[kLanes - 1], 0);
 }
 
+// As a stream between two messages.
+struct Pause {
+  bool await_ready() const { return false; }
+  void await_suspend(std::coroutine_handle<> call) { waiting = call; }
+  void await_resume() const {}
+  std::atomic<std::coroutine_handle<>> waiting{nullptr};
+};
+
+Task<bool> waits_after_a_turn(Compute& compute, Pause& pause) {
+  co_await compute.turn(false);
+  co_await pause;
+  co_return true;
+}
+
+TEST(Turns, OfCallsThatWaitForTheirClientLeaveAllThreadsToOthers) {
+  Compute compute(2, {});
+  Pause pauses[2];
+  std::vector<std::thread> idle;
+  for (Pause& pause : pauses) idle.emplace_back([&] { EXPECT_TRUE(wait_for(waits_after_a_turn(compute, pause))); });
+  for (Pause& pause : pauses)
+    while (pause.waiting.load() == nullptr) std::this_thread::yield();
+  while (!compute.idle()) std::this_thread::yield();
+  // A long call is alone: its pieces are large, and on all threads.
+  std::atomic<int> pieces = 0, spread = 0;
+  const auto large = [&]() -> Task<bool> {
+    co_await compute.turn(true);
+    auto each = compute.each(2'000'000, [&](std::size_t, std::size_t, const Execution& execution) {
+      ++pieces;
+      spread += execution.threads != Threads::one;
+      return true;
+    });
+    co_await each;
+    co_return true;
+  };
+  EXPECT_TRUE(wait_for(large()));
+  EXPECT_EQ(spread, pieces);
+  EXPECT_EQ(pieces, 8);
+  for (Pause& pause : pauses) pause.waiting.load().resume();
+  for (std::thread& thread : idle) thread.join();
+}
+
 TEST(Room, IsNeverGivenToMoreThanFit) {
   // Half of 16 messages.
   Admission admission({.calls = 100, .open = 100, .bytes = 16'000, .message_bytes = 1000, .patience = 10s});

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <ranges>
+#include <span>
 #include <type_traits>
 
 namespace facetwise {
@@ -53,6 +54,7 @@ class OutputColumn {
   template <std::ranges::contiguous_range Range>
   requires std::is_same_v<std::ranges::range_value_t<Range>, T> OutputColumn(Range& values)  // NOLINT: implicit
       : OutputColumn(std::ranges::data(values), std::ranges::size(values)) {}
+  OutputColumn(std::span<T> values) : OutputColumn(values.data(), values.size()) {}  // NOLINT: implicit
 
   bool present() const { return present_; }
   std::size_t count() const { return count_; }

@@ -18,19 +18,26 @@ class ColumnMemory {
   ColumnMemory() = default;
   // Throws std::bad_alloc.
   ColumnMemory(std::size_t columns, std::size_t lanes);
+  // The same in memory of the caller's that begins at a page: bytes() of it, for as long as it is used.
+  ColumnMemory(void* memory, std::size_t columns, std::size_t lanes);
 
   std::size_t columns() const { return columns_; }
   std::size_t lanes() const { return lanes_; }
   // index < columns().
   float* operator[](std::size_t index) const { return data_.get() + index * stride_; }
 
-  // Bytes that it takes.
+  // Bytes that it takes, without rounding to large pages.
   static std::size_t bytes(std::size_t columns, std::size_t lanes);
 
  private:
   static constexpr std::size_t kLargePage = std::size_t{2} << 20;
   struct Free {
-    void operator()(float* p) const { ::operator delete[](p, std::align_val_t{kLargePage}); }
+    Free() : owned(true) {}
+    explicit Free(bool is_owned) : owned(is_owned) {}
+    void operator()(float* p) const {
+      if (owned) ::operator delete[](p, std::align_val_t{kLargePage});
+    }
+    bool owned;
   };
   std::size_t columns_ = 0, lanes_ = 0, stride_ = 0;
   std::unique_ptr<float[], Free> data_;

@@ -18,38 +18,53 @@ using wire::MessageWriter;
 
 absl::Status bad_answer(absl::string_view what) { return absl::InternalError(absl::StrCat("its answer ", what)); }
 
-unsigned wanted_outputs(Batch& batch) {
-  unsigned outputs = 0;
-  for (std::size_t k = 0; k < wire::output_places().size(); ++k)
-    if (output_fields()[k].column(batch).present()) outputs |= 1u << wire::output_places()[k].output;
-  for (std::size_t k = 0; k < wire::byte_places().size(); ++k)
-    if (byte_fields()[k].column(batch).present()) outputs |= 1u << wire::byte_places()[k].output;
-  return outputs;
-}
-
-std::size_t most_lanes(Batch& batch, bool sends_ids, unsigned outputs, const PieceLimits& limits) {
-  std::size_t request = sends_ids ? sizeof(std::uint64_t) : 0, response = 0;
-  for (const InputField& field : input_fields())
-    if (const auto& column = field.column(batch); column.present() && !column.one_value()) request += sizeof(float);
-  for (const auto& place : wire::output_places())
-    if (outputs & (1u << place.output)) response += sizeof(float);
-  for (const auto& place : wire::byte_places())
-    if (outputs & (1u << place.output)) ++response;
-  return limits.lanes(request, response);
-}
-
 }  // namespace
 
-BatchPieces::BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits)
+BatchPieces::BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits, const SharedMemory* shared)
     : operation_(operation),
       batch_(batch),
       positions_(batch.lanes, batch.active),
+      shared_(positions_.all() ? shared : nullptr),
       // Without ids of their own, lanes that are not neighbours need them: first_id + index. One id for all
       // stays one value.
       sends_ids_(batch.generator && ((batch.generator->id.present() && !batch.generator->id.one_value()) ||
                                      (!batch.generator->id.present() && batch.active))),
-      outputs_(wanted_outputs(batch_)),
-      split_(positions_.count(), most_lanes(batch_, sends_ids_, outputs_, limits)) {}
+      split_(positions_.count(), most_lanes(limits)) {}
+
+template <class AnyColumn>
+bool BatchPieces::is_shared(const AnyColumn& column) const {
+  if (shared_ == nullptr || column.count() <= 1) return false;
+  using Value = std::remove_reference_t<decltype(*column.data())>;
+  const bool aligned =
+      reinterpret_cast<std::uintptr_t>(column.data()) % sizeof(Value) == 0 && column.stride() % sizeof(Value) == 0;
+  return aligned && shared_->holds(column.data(), (column.count() - 1) * column.stride() + sizeof(Value));
+}
+
+// Also finds out which outputs are wanted where.
+std::size_t BatchPieces::most_lanes(const PieceLimits& limits) {
+  std::size_t request = sends_ids_ && !is_shared(batch_.generator->id) ? sizeof(std::uint64_t) : 0, response = 0;
+  for (const InputField& field : input_fields())
+    if (const auto& column = field.column(batch_); column.present() && !column.one_value() && !is_shared(column))
+      request += sizeof(float);
+  // An output of several columns is in shared memory if all that are wanted of it are.
+  unsigned wanted = 0, elsewhere = 0;
+  const auto look = [&](const auto& column, v1::Output output) {
+    if (!column.present()) return;
+    wanted |= 1u << output;
+    if (!is_shared(column)) elsewhere |= 1u << output;
+  };
+  for (std::size_t k = 0; k < wire::output_places().size(); ++k)
+    look(output_fields()[k].column(batch_), wire::output_places()[k].output);
+  for (std::size_t k = 0; k < wire::byte_places().size(); ++k)
+    look(byte_fields()[k].column(batch_), wire::byte_places()[k].output);
+  outputs_ = elsewhere;
+  shared_outputs_ = wanted & ~elsewhere;
+  for (const auto& place : wire::output_places())
+    if (outputs_ & (1u << place.output)) response += sizeof(float);
+  for (const auto& place : wire::byte_places())
+    if (outputs_ & (1u << place.output)) ++response;
+  return limits.lanes(request, response);
+}
 
 Pieces BatchPieces::pieces() {
   return {"/facetwise.v1.Sampler/Run", split_.pieces(), [this](std::size_t piece) { return encode(piece); },
@@ -82,13 +97,37 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
     if (!batch.generator->id.present() && !sends_ids_) generator.set_first_id(batch.generator->first_id + range.begin);
   }
 
+  const auto share = [&](std::string_view name, const auto& column) {
+    v1::SharedColumns& shared = *small.mutable_shared();
+    shared.set_region(shared_->id());
+    v1::SharedColumn& place = *shared.add_columns();
+    place.set_name(std::string(name));
+    place.set_offset(reinterpret_cast<std::uintptr_t>(&column[range.begin]) -
+                     reinterpret_cast<std::uintptr_t>(shared_->data()));
+    place.set_count(range.size());
+    place.set_stride(column.stride());
+  };
   const auto places = wire::input_places();
   const auto fields = input_fields();
+  for (const InputField& field : fields)
+    if (const auto& column = field.column(batch); is_shared(column)) share(field.name, column);
+  const bool shares_ids = batch.generator && is_shared(batch.generator->id);
+  if (shares_ids) share("generator.id", batch.generator->id);
+  const auto share_outputs = [&](const auto& all, const auto& all_places) {
+    for (std::size_t k = 0; k < all.size(); ++k)
+      if (const auto& column = all[k].column(batch);
+          column.present() && (shared_outputs_ & (1u << all_places[k].output)) != 0)
+        share(all[k].name, column);
+  };
+  share_outputs(output_fields(), wire::output_places());
+  share_outputs(byte_fields(), wire::byte_places());
+
   const auto bytes_of = [&](std::size_t k) -> std::size_t {
     const Column<float>& column = fields[k].column(batch);
-    return column.present() ? values_sent(column, range) * sizeof(float) : 0;
+    return column.present() && !is_shared(column) ? values_sent(column, range) * sizeof(float) : 0;
   };
-  const std::size_t id_bytes = !batch.generator                ? 0
+  const auto part_bytes = [&](std::size_t k) { return bytes_of(k) == 0 ? 0 : MessageWriter::field_bytes(bytes_of(k)); };
+  const std::size_t id_bytes = !batch.generator || shares_ids  ? 0
                                : sends_ids_                    ? range.size() * 8
                                : batch.generator->id.present() ? 8
                                                                : 0;
@@ -98,11 +137,11 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
   MessageWriter writer(fields.size() + 1, bytes, small.ByteSizeLong(), false);
   writer.fields(small);
   for (std::size_t k = 0; k < fields.size(); ++k) {
+    // x, y and z of a direction are one message, of the parts that are sent.
+    if (places[k].part == 1)
+      if (const std::size_t parts = part_bytes(k) + part_bytes(k + 1) + part_bytes(k + 2); parts > 0)
+        writer.begin(places[k].field, parts);
     if (bytes_of(k) == 0) continue;
-    if (places[k].part == 1)  // x: y and z follow
-      writer.begin(places[k].field, MessageWriter::field_bytes(bytes_of(k)) +
-                                        MessageWriter::field_bytes(bytes_of(k + 1)) +
-                                        MessageWriter::field_bytes(bytes_of(k + 2)));
     gather(fields[k].column(batch), positions_, range,
            writer.column(places[k].part == 0 ? places[k].field : places[k].part, bytes_of(k)));
   }
@@ -130,9 +169,10 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
   const auto fields = output_fields();
   const auto byte_places = wire::byte_places();
   for (std::size_t k = 0; k < places.size(); ++k)
-    if (fields[k].column(batch_).present()) missing |= 1u << k;
+    if (fields[k].column(batch_).present() && (outputs_ & (1u << places[k].output)) != 0) missing |= 1u << k;
   for (std::size_t k = 0; k < byte_places.size(); ++k)
-    if (byte_fields()[k].column(batch_).present()) missing |= 1u << (places.size() + k);
+    if (byte_fields()[k].column(batch_).present() && (outputs_ & (1u << byte_places[k].output)) != 0)
+      missing |= 1u << (places.size() + k);
 
   // Reads a column, or passes over one that was not asked for (y of a direction of which only x was).
   const auto read_column = [&](const MessageReader::Field& field, int number, int part) {

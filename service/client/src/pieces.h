@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "facetwise/engine.h"
+#include "facetwise/shared_memory.h"
 #include "src/pipeline.h"
 
 namespace facetwise {
@@ -62,19 +63,24 @@ struct PieceLimits {
 // The pieces of a checked call. They refer to the call's columns.
 class BatchPieces {
  public:
-  BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits);
+  // Columns in `shared`, if there is any, are named instead of sent.
+  BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits, const SharedMemory* shared = nullptr);
   Pieces pieces();
   const Statistics& statistics() const { return statistics_; }
 
  private:
   grpc::ByteBuffer encode(std::size_t piece) const;
   absl::Status decode(std::size_t piece, grpc::ByteBuffer& response);
+  template <class AnyColumn>
+  bool is_shared(const AnyColumn& column) const;
+  std::size_t most_lanes(const PieceLimits& limits);
 
   Operation operation_;
   Batch batch_;
   Positions positions_;
+  const SharedMemory* shared_;
   bool sends_ids_;
-  unsigned outputs_ = 0;  // bit (1 << v1::Output)
+  unsigned outputs_ = 0, shared_outputs_ = 0;  // bit (1 << v1::Output): those that are sent, and those in shared memory
   Split split_;
   Statistics statistics_;
 };

@@ -140,7 +140,7 @@ class Sender {
     }
     call.connection = server;
     ++servers_[server].load;
-    const auto& [channel, stub] = connections_[server];
+    const auto& [channel, stub, memory] = connections_[server];
     call.context.emplace();
     call.context->set_deadline(std::chrono::system_clock::now() + options_.call_timeout);
     channel.authorise(*call.context);
@@ -171,10 +171,15 @@ class Sender {
     const std::string id = request_id(*call.context);
     if (!id.empty())
       last_error_ = absl::Status(last_error_.code(), absl::StrCat(last_error_.message(), " (request ", id, ")"));
+    // A server that has only become silent may go on later, and write to memory that is used for something else then.
+    if (MemoryOffer* memory = connections_[call.connection].memory.get();
+        memory != nullptr && id.empty() && !memory->has_ended())
+      return absl::Status(last_error_.code(),
+                          absl::StrCat(last_error_.message(), ": it may still write to the shared memory"));
     if (call.status.error_code() == grpc::StatusCode::NOT_FOUND && pieces_.provide &&
         provided_ < kProvisions * connections_.size()) {
       ++provided_;
-      if (auto status = pieces_.provide(connections_[call.connection].channel); !status.ok()) return status;
+      if (auto status = pieces_.provide(connections_[call.connection]); !status.ok()) return status;
     } else {
       const auto rest = rest_after(call.status, !id.empty());
       if (!rest) return last_error_;

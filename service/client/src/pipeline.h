@@ -11,12 +11,14 @@
 #include "facetwise/channel.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
+#include "src/memory_offer.h"
 
 namespace facetwise {
 
 struct Connection {
   Channel channel;
   std::unique_ptr<grpc::GenericStub> stub;
+  std::shared_ptr<MemoryOffer> memory{};  // where memory is shared
 };
 
 // A batch's way through: pieces are numbered; each becomes a request, and its response is taken apart.
@@ -26,7 +28,7 @@ struct Pieces {
   std::function<grpc::ByteBuffer(std::size_t piece)> encode;
   std::function<absl::Status(std::size_t piece, grpc::ByteBuffer& response)> decode;
   // Gives a server what it says that it has not found; the piece is sent again. May be empty.
-  std::function<absl::Status(const Channel& channel)> provide = {};
+  std::function<absl::Status(const Connection& connection)> provide = {};
 };
 
 // Some milliseconds, in which connections get further: gRPC makes them only while somebody waits for one.

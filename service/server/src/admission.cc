@@ -25,7 +25,7 @@ Admission::~Admission() {
   thread_.join();
 }
 
-absl::Status Admission::refuse(std::string message) {
+absl::Status Admission::refuse(const std::string& message) {
   refused_ = true;
   look_.notify_one();
   return absl::ResourceExhaustedError(absl::StrCat(message, ": try again later"));

@@ -118,7 +118,7 @@ class Admission {
 
  private:
   void look();
-  absl::Status refuse(std::string message);
+  absl::Status refuse(const std::string& message);
   bool may_have_room(const Stay& stay) const;
   void give_room(Stay& stay);
   // Gives room to those that wait for it, who go on without the lock.

@@ -12,6 +12,7 @@
 #include "src/call.h"
 #include "src/compute.h"
 #include "src/metrics.h"
+#include "src/shared_regions.h"
 #include "src/tables.h"
 #include "src/task.h"
 
@@ -30,6 +31,7 @@ struct CallTools {
   Limits limits;
   Compute& compute;
   Tables& tables;
+  const SharedRegions& regions;
   Admission::Stay& stay;
   const std::atomic<bool>& stop;  // the call is cancelled
   Metrics& metrics;

@@ -2,9 +2,12 @@
 // the response's columns where gRPC sends them from.
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
 #include "src/answer.h"
@@ -35,7 +38,8 @@ class Decoder {
       : reader_(message), block_(message.Length() + (input_fields().size() + 1) * kAlignment) {}
 
   absl::Status read();
-  absl::Status make_batch(const Limits& limits, Tables& tables, Batch& batch);
+  // `region`: what holds the batch's columns in shared memory, if any.
+  absl::Status make_batch(const CallTools& tools, Batch& batch, std::shared_ptr<const SharedRegions::Region>& region);
 
   std::uint64_t lanes() const { return lanes_; }
   Operation operation() const { return *operation_; }
@@ -47,6 +51,8 @@ class Decoder {
   absl::Status read_direction(int field, std::size_t bytes);
   absl::Status read_generator(std::size_t bytes);
   absl::Status read_outputs(const MessageReader::Field& field);
+  absl::Status read_shared(std::size_t bytes);
+  absl::Status place_shared(const v1::SharedColumn& column, const SharedRegions::Region& region, Batch& batch) const;
   absl::Status read_column(absl::string_view name, std::size_t width, const MessageReader::Field& field, Bytes& column);
   absl::Status read_enum(const MessageReader::Field& field, int& value);
   absl::Status add_output(std::uint64_t value);
@@ -72,6 +78,7 @@ class Decoder {
   bool has_generator_ = false;
   Generator generator_;
   Bytes generator_id_;
+  v1::SharedColumns shared_;
 };
 
 template <class Read>
@@ -106,6 +113,7 @@ absl::Status Decoder::read_field(const MessageReader::Field& field) {
     case Request::kModelFieldNumber: return reader_.length(field, bytes) ? read_model(bytes) : damaged_message();
     case Request::kGeneratorFieldNumber:
       return reader_.length(field, bytes) ? read_generator(bytes) : damaged_message();
+    case Request::kSharedFieldNumber: return reader_.length(field, bytes) ? read_shared(bytes) : damaged_message();
     case Request::kIncidentFieldNumber:
     case Request::kOutgoingFieldNumber:
       return reader_.length(field, bytes) ? read_direction(field.number, bytes) : damaged_message();
@@ -195,6 +203,48 @@ absl::Status Decoder::read_outputs(const MessageReader::Field& field) {
   return good ? absl::OkStatus() : damaged_message();
 }
 
+absl::Status Decoder::read_shared(std::size_t bytes) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 14;
+  if (bytes > kMostBytes) return invalid_field("shared", absl::StrCat(bytes, " bytes, at most ", kMostBytes));
+  std::string text(bytes, '\0');
+  return reader_.read(text.data(), bytes) && shared_.MergeFromString(text) ? absl::OkStatus() : damaged_message();
+}
+
+absl::Status Decoder::place_shared(const v1::SharedColumn& column, const SharedRegions::Region& region,
+                                   Batch& batch) const {
+  const absl::string_view name = column.name();
+  const auto place = [&]<class T>(T& to, std::size_t width) {
+    if (to.present()) return invalid_field(name, "given twice");
+    const std::uint64_t offset = column.offset(), count = column.count(), stride = column.stride();
+    if (offset % width != 0 || stride % width != 0 || stride == 0)
+      return invalid_field(
+          name, absl::StrCat("offset ", offset, " and stride ", stride, " are not whole values of ", width, " bytes"));
+    if (count > 0 && (offset > region.bytes() || width > region.bytes() - offset ||
+                      (count - 1) > (region.bytes() - offset - width) / stride))
+      return invalid_field(name, absl::StrCat("goes beyond the shared memory of ", region.bytes(), " bytes"));
+    using Value = std::remove_cvref_t<decltype(*to.data())>;
+    to = T(reinterpret_cast<Value*>(region.data() + (count > 0 ? offset : 0)), count, stride);
+    return absl::OkStatus();
+  };
+  for (const InputField& field : input_fields())
+    if (view(field.name) == name) return place(field.column(batch), sizeof(float));
+  if (name == "generator.id") {
+    if (!batch.generator) return invalid_field(name, "without a generator");
+    return place(batch.generator->id, sizeof(std::uint64_t));
+  }
+  const auto computed = [&](auto& field, v1::Output output, std::size_t width) {
+    if ((wire::outputs_of(*operation_) & (1u << output)) == 0)
+      return invalid_field(name, absl::StrCat("not computed by ", view(facetwise::name(*operation_))));
+    if ((outputs_ & (1u << output)) != 0) return invalid_field(name, "wanted in the answer and in shared memory");
+    return place(field.column(batch), width);
+  };
+  for (std::size_t k = 0; k < output_fields().size(); ++k)
+    if (view(output_fields()[k].name) == name) return computed(output_fields()[k], wire::output_places()[k].output, 4);
+  for (std::size_t k = 0; k < byte_fields().size(); ++k)
+    if (view(byte_fields()[k].name) == name) return computed(byte_fields()[k], wire::byte_places()[k].output, 1);
+  return invalid_field("shared.columns", absl::StrCat("no column \"", absl::CHexEscape(name), "\""));
+}
+
 absl::Status Decoder::add_output(std::uint64_t value) {
   if (value == v1::OUTPUT_UNSPECIFIED) return invalid_field("outputs", "holds OUTPUT_UNSPECIFIED");
   if (value > static_cast<std::uint64_t>(v1::Output_MAX))
@@ -219,7 +269,8 @@ absl::Status Decoder::read_column(absl::string_view name, std::size_t width, con
 }
 
 // The wire's own checks; the rest is for the engine's.
-absl::Status Decoder::make_batch(const Limits& limits, Tables& tables, Batch& batch) {
+absl::Status Decoder::make_batch(const CallTools& tools, Batch& batch,
+                                 std::shared_ptr<const SharedRegions::Region>& region) {
   const auto unknown = [](absl::string_view field, int value) {
     return invalid_field(field, absl::StrCat("unknown value ", value));
   };
@@ -249,14 +300,14 @@ absl::Status Decoder::make_batch(const Limits& limits, Tables& tables, Batch& ba
                  .compensation = *compensation,
                  .retro = retro_};
   if (slope_table_ != 0) {
-    batch.model.table = tables.find(slope_table_);
+    batch.model.table = tools.tables.find(slope_table_);
     if (batch.model.table == nullptr)
       return absl::NotFoundError(
           absl::StrCat("model.slope_table: no table ", absl::Hex(slope_table_, absl::kZeroPad16), " here: upload it"));
   }
   // Until the columns are there, which decide what an unspecified one means.
   if (!wire::sampler_from(sampler_, Sampler::visible)) return unknown("sampler", sampler_);
-  if (auto status = check_lanes(lanes_, limits); !status.ok()) return status;
+  if (auto status = check_lanes(lanes_, tools.limits); !status.ok()) return status;
   if (const unsigned strange = outputs_ & ~wire::outputs_of(*operation_); strange != 0) {
     const auto output = static_cast<v1::Output>(std::countr_zero(strange));
     return invalid_field("outputs",
@@ -271,17 +322,25 @@ absl::Status Decoder::make_batch(const Limits& limits, Tables& tables, Batch& ba
   for (std::size_t k = 0; k < fields.size(); ++k)
     if (inputs_[k].size > 0)
       fields[k].column(batch) = {reinterpret_cast<const float*>(inputs_[k].data), inputs_[k].size / 4};
-  batch.sampler = *wire::sampler_from(sampler_, default_sampler(*operation_, batch));
-  for (std::size_t k = 0; k < fields.size(); ++k) {
-    const bool expected = reads(*operation_, batch.model, batch.sampler, fields[k]) && !fields[k].otherwise &&
-                          !(fields[k].random && has_generator_);
-    if (inputs_[k].size == 0 && lanes_ == 0 && expected)
-      fields[k].column(batch) = {reinterpret_cast<const float*>(&kNothing), 0};
-  }
   if (has_generator_) {
     if (generator_id_.size > 0)
       generator_.id = {reinterpret_cast<const std::uint64_t*>(generator_id_.data), generator_id_.size / 8};
     batch.generator = generator_;
+  }
+  if (shared_.columns_size() > 0) {
+    region = tools.regions.find(shared_.region());
+    if (region == nullptr)
+      return absl::NotFoundError(
+          absl::StrCat("shared.region: no memory ", absl::Hex(shared_.region(), absl::kZeroPad16), " is shared here"));
+    for (const v1::SharedColumn& column : shared_.columns())
+      if (auto status = place_shared(column, *region, batch); !status.ok()) return status;
+  }
+  batch.sampler = *wire::sampler_from(sampler_, default_sampler(*operation_, batch));
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const bool expected = reads(*operation_, batch.model, batch.sampler, fields[k]) && !fields[k].otherwise &&
+                          !(fields[k].random && has_generator_);
+    if (!fields[k].column(batch).present() && lanes_ == 0 && expected)
+      fields[k].column(batch) = {reinterpret_cast<const float*>(&kNothing), 0};
   }
   return absl::OkStatus();
 }
@@ -327,17 +386,17 @@ class Response {
   std::size_t lanes_;
 };
 
-// Some lanes of a batch whose columns are contiguous.
+// Some lanes of a batch.
 Batch piece(const Batch& batch, std::size_t begin, std::size_t end) {
   if (end - begin == batch.lanes) return batch;
   Batch some = batch;
   some.lanes = end - begin;
   const auto cut = [&](auto& column) {
-    if (column.present() && !column.one_value()) column = {column.data() + begin, some.lanes};
+    if (column.present() && !column.one_value()) column = {&column[begin], some.lanes, column.stride()};
   };
   for (const InputField& field : input_fields()) cut(field.column(some));
   const auto cut_output = [&](auto& column) {
-    if (column.present()) column = {column.data() + begin, some.lanes};
+    if (column.present()) column = {&column[begin], some.lanes, column.stride()};
   };
   for (const OutputField& field : output_fields()) cut_output(field.column(some));
   for (const ByteField& field : byte_fields()) cut_output(field.column(some));
@@ -364,7 +423,8 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, c
   Batch batch;
   if (auto status = decoder.read(); !status.ok()) co_return status;
   request.Clear();
-  if (auto status = decoder.make_batch(tools.limits, tools.tables, batch); !status.ok()) co_return status;
+  std::shared_ptr<const SharedRegions::Region> region;
+  if (auto status = decoder.make_batch(tools, batch, region); !status.ok()) co_return status;
 
   const Response response(decoder.outputs(), decoder.lanes());
   if (response.bytes() > tools.limits.message_bytes)

@@ -54,6 +54,8 @@ class Metrics::Gauges final : public prometheus::Collectable {
     add_limited("facetwise_connections", "Connections", load.connections(), limits.connections());
     add_limited("facetwise_table_bytes", "Tables of slopes that clients have uploaded",
                 static_cast<double>(load.table_bytes()), static_cast<double>(limits.table_bytes()));
+    add_limited("facetwise_shared_bytes", "Memory that clients on this machine share",
+                static_cast<double>(load.shared_bytes()), static_cast<double>(limits.shared_bytes()));
     return families;
   }
 

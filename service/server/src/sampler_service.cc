@@ -81,9 +81,11 @@ LogLevel level_of(const grpc::Status& status) {
 
 }  // namespace
 
-SamplerService::SamplerService(const ServerOptions& options, const Connections& connections, Log& log)
+SamplerService::SamplerService(const ServerOptions& options, const Connections& connections,
+                               const SharedRegions& regions, Log& log)
     : options_(options),
       connections_(connections),
+      regions_(regions),
       log_(log),
       run_(random_name()),
       limits_{options.max_message_bytes},
@@ -97,8 +99,12 @@ SamplerService::SamplerService(const ServerOptions& options, const Connections& 
       tokens_(options.token_file, log),
       identity_(identify()),
       metrics_(identity_, [this] { return load(); }) {
-  const auto one = [this](Answer answer) { return [this, answer](Call& call) { return answer_one(answer, call); }; };
-  const auto many = [this](Answer answer) { return [this, answer](Call& call) { return answer_many(answer, call); }; };
+  const auto one = [this](const Answer& answer) {
+    return [this, answer](Call& call) { return answer_one(answer, call); };
+  };
+  const auto many = [this](const Answer& answer) {
+    return [this, answer](Call& call) { return answer_many(answer, call); };
+  };
   add("Run", one(with_tools("Run", answer_batch)));
   add("RunStream", many(with_tools("RunStream", answer_batch)));
   add("Compact", one(with_tools("Compact", answer_compact)));
@@ -114,7 +120,7 @@ SamplerService::~SamplerService() {
   if (benchmark_thread_.joinable()) benchmark_thread_.join();
 }
 
-void SamplerService::add(const std::string& name, Call::Course course) {
+void SamplerService::add(const std::string& name, const Call::Course& course) {
   const auto admitted = [this, course](Call& call) -> Task<Call::End> {
     if (auto status = tokens_.check(call.context()); !status.ok()) co_return {to_grpc(status)};
     if (auto status = call.stay().enter(); !status.ok()) co_return {to_grpc(status)};
@@ -177,7 +183,7 @@ SamplerService::Answer SamplerService::with_tools(const char* method, AnswerColu
     const auto begin = std::chrono::steady_clock::now();
     const std::size_t received = request.Length();
     call.facts().received += received;
-    const CallTools tools{limits_, compute_, tables_, call.stay(), call.stop(), metrics_, call.facts()};
+    const CallTools tools{limits_, compute_, tables_, regions_, call.stay(), call.stop(), metrics_, call.facts()};
     auto answering = answer(request, tools);
     auto answered = co_await answering;
     // The request is no more.
@@ -316,6 +322,7 @@ v1::InfoResponse SamplerService::identify() const {
   limits.set_connections(connections_.most());
   limits.set_table_bytes(tables_.max_bytes());
   limits.set_lanes(limits_.lanes());
+  limits.set_shared_bytes(regions_.max_bytes());
   std::vector<Model> models = all_models();
   for (const Masking masking : {Masking::smith, Masking::vcavity})
     models.push_back({.distribution = Distribution::table, .masking = masking});
@@ -337,6 +344,7 @@ v1::ServerLoad SamplerService::load() const {
   load.set_held_bytes(calls.bytes);
   load.set_connections(connections_.count());
   load.set_table_bytes(tables_.bytes());
+  load.set_shared_bytes(regions_.bytes());
   load.set_lanes(metrics_.lanes());
   load.set_serving(serving_);
   load.set_uptime_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count());

@@ -18,6 +18,7 @@
 #include "src/compute.h"
 #include "src/log.h"
 #include "src/metrics.h"
+#include "src/shared_regions.h"
 #include "src/tables.h"
 #include "src/task.h"
 #include "src/tokens.h"
@@ -29,8 +30,8 @@ namespace facetwise {
 // place.
 class SamplerService final : public grpc::Service {
  public:
-  // `connections` and `log` must outlive it.
-  SamplerService(const ServerOptions& options, const Connections& connections, Log& log);
+  // All that it is given but the options must outlive it.
+  SamplerService(const ServerOptions& options, const Connections& connections, const SharedRegions& regions, Log& log);
   ~SamplerService() override;
 
   // Before the first call. Error: the file of tokens, and why.
@@ -47,7 +48,7 @@ class SamplerService final : public grpc::Service {
   using AnswerColumns = Task<absl::StatusOr<grpc::ByteBuffer>> (*)(grpc::ByteBuffer&, const CallTools&);
 
   // After the caller's token has been checked and the call is admitted. By the method's name.
-  void add(const std::string& name, Call::Course course);
+  void add(const std::string& name, const Call::Course& course);
   Answer with_tools(const char* method, AnswerColumns answer);
   // Counts the call, and logs it.
   void tell_end(const std::string& method, Call& call, const grpc::Status& status, std::chrono::duration<double> time);
@@ -69,6 +70,7 @@ class SamplerService final : public grpc::Service {
 
   const ServerOptions options_;
   const Connections& connections_;
+  const SharedRegions& regions_;
   Log& log_;
   const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
   const std::string run_;  // names this run of the server, in request ids

@@ -18,6 +18,7 @@
 #include "src/sampler_service.h"
 #include "src/tls.h"
 #include "wire/keep_grpc.h"
+#include "wire/region.h"
 
 namespace facetwise {
 namespace {
@@ -33,8 +34,10 @@ absl::Status check_options(const ServerOptions& options) {
   const auto invalid = [](absl::string_view what) { return absl::InvalidArgumentError(what); };
   if (options.listen.empty()) return invalid("listen: no address given: unix:PATH or HOST:PORT");
   for (const std::string& address : options.listen)
-    if (auto status = check_address(address, options.insecure || !options.tls_certificate.empty()); !status.ok())
-      return status;
+    for (const std::string& each :
+         {address, unix_path(address).empty() || options.max_shared_bytes == 0 ? address : wire::region_path(address)})
+      if (auto status = check_address(each, options.insecure || !options.tls_certificate.empty()); !status.ok())
+        return status;
   if (!options.metrics.empty()) {
     if (!unix_path(options.metrics).empty() || !check_address(options.metrics, true).ok())
       return invalid(absl::StrCat("metrics: \"", options.metrics, "\" is not IP:PORT"));
@@ -66,7 +69,8 @@ class GrpcServer final : public Server {
       : options_(options),
         log_(options.log, options.log_level),
         connections_(options.max_connections),
-        service_(options, connections_, log_) {}
+        regions_(options.max_shared_bytes, options.unix_users, log_),
+        service_(options, connections_, regions_, log_) {}
   ~GrpcServer() override { drain(); }
 
   absl::Status listen();
@@ -83,6 +87,7 @@ class GrpcServer final : public Server {
   const ServerOptions options_;
   Log log_;
   Connections connections_;
+  SharedRegions regions_;
   SamplerService service_;
   std::vector<SocketLock> sockets_;
   std::vector<std::string> addresses_;
@@ -126,6 +131,7 @@ absl::Status GrpcServer::listen() {
       builder.experimental().AddExternalConnectionAcceptor(External::FROM_FD, grpc::InsecureServerCredentials());
   auto to_tcp = builder.experimental().AddExternalConnectionAcceptor(External::FROM_FD, credentials(options_));
   std::vector<Acceptor::Place> places;
+  std::vector<Socket> for_memory;
   for (const std::string& address : options_.listen) {
     const std::string path = unix_path(address);
     if (!path.empty()) {
@@ -135,6 +141,14 @@ absl::Status GrpcServer::listen() {
     }
     auto listening = listen_on(address, options_.unix_mode);
     if (!listening.ok()) return listening.status();
+    if (!path.empty() && options_.max_shared_bytes > 0) {
+      auto lock = SocketLock::take(wire::region_path(path));
+      if (!lock.ok()) return lock.status();
+      sockets_.push_back(*std::move(lock));
+      auto memory = listen_on(wire::region_path(address), options_.unix_mode);
+      if (!memory.ok()) return memory.status();
+      for_memory.push_back(std::move(memory->sockets[0]));
+    }
     addresses_.push_back(listening->address);
     for (Socket& socket : listening->sockets)
       places.push_back({std::move(socket), path.empty() ? to_tcp.get() : to_unix.get()});
@@ -146,6 +160,7 @@ absl::Status GrpcServer::listen() {
     if (!listening.ok()) return listening.status();
     metrics_ = *std::move(listening);
   }
+  if (!for_memory.empty()) regions_.listen(std::move(for_memory));
   acceptor_.emplace(std::move(places), std::move(to_unix), std::move(to_tcp), options_.unix_users, connections_, log_);
   server_->GetHealthCheckService()->SetServingStatus("facetwise.v1.Sampler", true);
   const v1::InfoResponse& info = service_.identity();

@@ -14,6 +14,8 @@
 
 namespace facetwise {
 
+class SharedMemory;
+
 struct ConnectOptions {
   // Lanes of a batch are sent in pieces of about this many bytes (request or response, the larger), several
   // at a time. Below the server's limit always.
@@ -31,6 +33,9 @@ struct ConnectOptions {
   // A file whose first line is the token that the server asks for (server.h). Refused where it would cross a network
   // without TLS.
   std::string token_file{};
+  // Columns that lie in this memory (shared_memory.h) are not sent: servers, which must all be unix:PATH and have been started to
+  // share memory, read and write them there.
+  std::shared_ptr<SharedMemory> shared_memory{};
   // Called once a batch, on the thread that asks for it: the W3C trace context ("00-...") that its calls belong to, which
   // servers write to their logs. Empty: none.
   std::function<std::string()> traceparent{};

@@ -70,6 +70,10 @@ struct ServerOptions {
   // Tables of slopes that clients upload: largest of one, of all together, and how long one stays that nobody uses.
   std::size_t max_table_bytes = std::size_t{64} << 20, max_tables_bytes = std::size_t{256} << 20;
   std::chrono::milliseconds table_idle_timeout{3600000};
+  // Bytes of memory that clients on this machine may share with the server, all together, so that columns there need not be
+  // sent; 0: none. They hand it over at PATH.memory beside a Unix socket PATH, and must be of the server's own user, or of
+  // `unix_users`.
+  std::size_t max_shared_bytes = 0;
   // How long a call may take to send its message, a stream may leave between messages, and a client may take to receive
   // an answer, before the call is cancelled.
   std::chrono::milliseconds read_timeout{20000}, stream_idle_timeout{300000}, write_timeout{60000};
