@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   const std::vector<Verb> verbs = {add_sample(app), add_pdf(app),    add_evaluate(app),   add_albedo(app),
                                    add_serve(app),  add_verify(app), add_bench(app),      add_summary(app),
                                    add_table(app),  add_render(app), add_experiment(app), add_report(app),
-                                   add_info(app),   add_load(app)};
+                                   add_info(app),   add_load(app),   add_transport(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

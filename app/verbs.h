@@ -23,6 +23,7 @@ Verb add_serve(CLI::App& app);
 Verb add_bench(CLI::App& app);
 Verb add_info(CLI::App& app);
 Verb add_load(CLI::App& app);
+Verb add_transport(CLI::App& app);
 Verb add_summary(CLI::App& app);
 Verb add_table(CLI::App& app);
 Verb add_render(CLI::App& app);

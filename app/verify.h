@@ -19,7 +19,7 @@ struct VerifyCase {
   Model model{};
   Sampler sampler = Sampler::exact;
   bool generator = true;  // the random numbers: the generator's, or columns
-  bool affine = false;   // mean slopes and correlated roughness too
+  bool affine = false;    // mean slopes and correlated roughness too
 };
 
 // What the batches are, in turn. Of GGX with Smith masking: reflections by every sampler, by the generator and by

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "facetwise/engine.h"
 #include "tests/app/command.h"
@@ -12,7 +13,8 @@ namespace {
 TEST(Help, EveryVerbExplainsItselfWithAnExample) {
   const auto all = facetwise({"--help"});
   ASSERT_EQ(all.code, 0);
-  for (const std::string verb : {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info", "load"}) {
+  for (const std::string verb :
+       {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info", "load", "transport"}) {
     EXPECT_NE(all.out.find("\n  " + verb + " "), std::string::npos) << verb;
     const auto help = facetwise({verb, "--help"});
     EXPECT_EQ(help.code, 0);
@@ -149,6 +151,28 @@ TEST(Load, CountsEveryCall) {
 }
 
 // Options of a server come from its command line, else from the environment, else from a file.
+TEST(Transport, MeasuresEveryWay) {
+  const auto result = facetwise({"transport", "--seconds", "0.002", "--json"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const nlohmann::json report = nlohmann::json::parse(result.out);
+  ASSERT_EQ(report["rates"].size(), 8u);  // two transports, calls and streams, two sizes
+  for (const auto& rate : report["rates"]) {
+    EXPECT_GT(rate["echo_mlanes"], 0);
+    EXPECT_GT(rate["facetwise_mlanes"], 0);
+    EXPECT_GT(rate["ratio"], 0);
+  }
+  ASSERT_EQ(report["delays"].size(), 2u);
+  for (const auto& delay : report["delays"]) EXPECT_LE(delay["facetwise_p50"], delay["facetwise_p99"]);
+  std::set<std::string> ways;
+  for (const auto& cost : report["costs"]) {
+    EXPECT_GT(cost["nanoseconds"], 0);
+    ways.insert(cost["way"]);
+  }
+  EXPECT_EQ(ways.size(), 7u);
+  EXPECT_TRUE(ways.contains("shared memory"));
+  EXPECT_EQ(facetwise({"transport", "--tls-ca", "x"}).code, 2);
+}
+
 TEST(Serve, TakesItsOptionsFromTheEnvironmentAndAFile) {
   const Directory directory;
   write_file(directory.path("serve.ini"), "# of a test\nthreads = 3\nmax-message-mib=5\nallow-benchmark=true\n");

@@ -55,6 +55,9 @@ struct PieceLimits {
   std::size_t lanes(std::size_t request_bytes, std::size_t response_bytes) const {
     constexpr std::size_t kOtherBytes = 1024;  // small fields, lengths, columns of one value
     const std::size_t limit = message_bytes - std::min(message_bytes / 2, kOtherBytes);
+    // Where nothing is sent a piece's work is what counts, as far as servers take so many lanes.
+    constexpr std::size_t kMost = std::size_t{1} << 20;
+    if (request_bytes + response_bytes == 0) return std::min(kMost, limit / 4);
     const std::size_t bytes = std::max<std::size_t>({request_bytes, response_bytes, 4});  // 4: the lane limit
     return std::max<std::size_t>(std::min(piece_bytes, limit) / bytes, 1);
   }
