@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "app/manual.h"
 #include "app/verbs.h"
 #include "facetwise/engine.h"
 #include "facetwise/tune_malloc.h"
@@ -41,6 +42,13 @@ int main(int argc, char** argv) {
                                    add_serve(app),  add_verify(app), add_bench(app),      add_summary(app),
                                    add_table(app),  add_render(app), add_experiment(app), add_report(app),
                                    add_info(app),   add_load(app),   add_transport(app)};
+  // For the installation; no verbs of their own.
+  if (argc == 3 && std::string(argv[1]) == "--write") {
+    const std::string what = argv[2];
+    const std::string text = what == "manual" ? manual_page(app) : what == "completion" ? bash_completion(app) : "";
+    std::fputs(text.c_str(), stdout);
+    return text.empty() ? kUsage : kDone;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -12,7 +12,7 @@ until grep -q ready "$folder/log"; do kill -0 $server; sleep 0.05; done
 cmp "$folder/one.ppm" "$folder/three.ppm"
 cmp "$folder/one.ppm" "$folder/remote.ppm"
 # A picture: many colours, and none of them the whole of it.
-colours=$(tail -c +16 "$folder/one.ppm" | xxd -p -c 3 | sort | uniq | wc -l)
+colours=$(tail -c +16 "$folder/one.ppm" | od -An -v -t x1 -w3 | sort | uniq | wc -l)
 [ "$colours" -gt 5000 ] || { echo "only $colours colours" >&2; exit 1; }
 if "$2" "$folder/none.ppm" "unix:$folder/nowhere" 2> "$folder/errors"; then exit 1; fi
 grep -q "server unix:$folder/nowhere: no answer" "$folder/errors"
