@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Builds facetwise, checks a server against this machine on real input, and measures. See --help.
 set -euo pipefail
 cd "$(dirname "$0")"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench: the benchmarks, here, against a server, or on a server's machine.
 #include <fmt/format.h>
 

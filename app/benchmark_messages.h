@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Benchmarks of a server's own machine: between the bench library and the protocol's messages.
 #pragma once
 

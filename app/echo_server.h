@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A server that does nothing: what transports cost by themselves.
 #pragma once
 

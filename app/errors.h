@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Statuses with formatted messages. Messages start with the file, flag or column that is wrong.
 #pragma once
 

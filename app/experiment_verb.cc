@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // experiment: the texts' experiments, as JSON for the report.
 #include <fmt/format.h>
 

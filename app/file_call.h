@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A batch call on files: a table's columns are the lanes' inputs and outputs.
 #pragma once
 

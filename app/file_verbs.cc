@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample, pdf, evaluate: the library's calls on files.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

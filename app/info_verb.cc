@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // info: what this program, this machine or a server is.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ctrl-C and SIGTERM as a wish to stop, for verbs that then write what is done.
 #pragma once
 

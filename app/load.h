@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Load on servers: how long calls take that come at their own times, whether or not those before them are answered.
 #pragma once
 

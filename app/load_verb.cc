@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // load: how long a server's calls take.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The command's manual and its completion in bash, made of its own help.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: pictures by the wavefront path tracer.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // serve: the library's calls for other processes and machines.
 #include <fmt/format.h>
 #include <pwd.h>

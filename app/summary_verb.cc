@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // summary: what run.sh ends with, from the JSON that bench and verify wrote.
 #include <fmt/format.h>
 

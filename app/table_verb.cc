@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // table: builds a table of slopes once, so that calls do not.
 #include <fmt/format.h>
 

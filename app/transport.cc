@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "app/transport.h"
 
 #include <algorithm>
@@ -183,7 +184,7 @@ class Measurement {
   Measurement(const TransportOptions& options, const std::function<void(double)>& progress)
       : options_(options), progress_(progress) {
     steps_ =
-        options.pairs.size() * (2 * std::size(kRateLanes) + 1) + std::size(kCostLanes) * (3 + 2 * options.pairs.size());
+        options.pairs.size() * (2 * std::size(kRateLanes) + 1) + std::size(kCostLanes) * (3 + 3 * options.pairs.size());
   }
 
   absl::StatusOr<TransportResult> run() {
@@ -303,6 +304,12 @@ class Measurement {
       if (!engine.ok()) return engine.status();
       if (auto status = cost(pair.name, **engine, batch); !status.ok()) return status;
       if (auto status = cost(pair.name + ", one roughness, library's numbers", **engine, small); !status.ok())
+        return status;
+      ConnectOptions compact = pair.connection;
+      compact.compact_answers = true;
+      const auto compact_engine = connect(std::span(&pair.facetwise, 1), compact);
+      if (!compact_engine.ok()) return compact_engine.status();
+      if (auto status = cost(pair.name + ", the same, compact answers", **compact_engine, small); !status.ok())
         return status;
     }
     if (options_.shared.empty()) return absl::OkStatus();

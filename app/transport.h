@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What it costs to ask a server: beside one that does nothing, and beside computing here.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // transport: what it costs to ask a server on this machine.
 #include <fmt/format.h>
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The verbs of the command. Each function adds one to the command line and returns what it does.
 #pragma once
 

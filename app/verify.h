@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Comparing two engines on real input, every byte.
 #pragma once
 

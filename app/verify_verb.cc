@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // verify: is a server's every byte what this machine computes?
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One benchmark: what is measured, by which implementation, on what inputs.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The memory that benchmarks read and write: columns as a caller that cares places them (ColumnMemory), and others as
 // malloc does.
 #pragma once

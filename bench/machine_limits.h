@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The machine's limits: copying the same columns, and peak of fused multiply-adds.
 #pragma once
 

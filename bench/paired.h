@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Ratios of times that hold on a noisy machine: both are measured in turn, A B B A, and the median of the
 // rounds' ratios is taken. Rounds are short, so that what disturbs them seldom hits only one side, and their
 // order turns, so that nothing periodic always hits the same one.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the machine can do, with the same instructions as the kernels: fused multiply-adds, and reading and
 // writing columns side by side.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "rejection.h"
 
 #include <cmath>
@@ -148,8 +149,7 @@ absl::Status count_rejections(std::size_t samples, Target target, const std::fun
     if (auto status = all_at("table", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok()) return status;
   for (const auto& [alpha_x, alpha_y] : kSweepAlpha)
     for (const double theta : kSweepTheta)
-      if (auto status = all_at("sweep", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok())
-        return status;
+      if (auto status = all_at("sweep", alpha_x, alpha_y, theta * kPi / 180, samples); !status.ok()) return status;
   for (const auto& [alpha, lanes] : kPost)
     for (const double theta : kPostTheta)
       if (auto status = all_at("post-2015", alpha, alpha, theta, lanes); !status.ok()) return status;
@@ -157,8 +157,8 @@ absl::Status count_rejections(std::size_t samples, Target target, const std::fun
   configurations.push_back(kBehind);
   for (const auto& [distribution, masking] : kModels)
     for (const auto& [theta, alpha_x, alpha_y] : configurations)
-      if (auto status = each("models", {.distribution = distribution, .masking = masking}, kModelSamplers,
-                                   alpha_x, alpha_y, theta * kPi / 180, samples);
+      if (auto status = each("models", {.distribution = distribution, .masking = masking}, kModelSamplers, alpha_x,
+                             alpha_y, theta * kPi / 180, samples);
           !status.ok())
         return status;
   return absl::OkStatus();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rejection-count experiment: how many samples of each sampler are occluded, counted through the kernels
 // and predicted.
 #pragma once

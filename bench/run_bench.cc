@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // run_bench(): checks the options and runs the parts one after another.
 #include <fmt/format.h>
 #include <tbb/global_control.h>

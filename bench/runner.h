@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a case does once: a call of the library, of a server, or of the baseline's loop.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The performance that facetwise sets itself to reach, measured.
 #pragma once
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # find_package(facetwise CONFIG [COMPONENTS engine client server]): the engine always, the others where they are asked for.
 include(CMakeFindDependencyMacro)
 find_dependency(absl CONFIG)

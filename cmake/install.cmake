@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What is installed, in components, and the .deb packages made of them (`cpack` in the build directory).
 #   engine   facetwise::facetwise and facetwise::reference      client  facetwise::client      server  facetwise::server
 #   c, c-dev the C interface                                    tools   the command
@@ -100,6 +101,7 @@ debian_package(module python3-facetwise "Microfacet normals and reflections in b
   "libfacetwise0 (= ${version}), python3, python3-numpy" python)
 set(CPACK_DEBIAN_DAEMON_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_MODULE_PACKAGE_ARCHITECTURE all)
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/triggers)
-set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/conffiles)
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/packages/triggers)
+set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/packages/conffiles)
+set(CPACK_DEBIAN_MODULE_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/packages/prerm)
 include(CPack)

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Installs what cmake/packages.txt lists and this machine lacks. Usage: cmake/install.sh [run|test]
 set -euo pipefail
 cd "$(dirname "$0")"

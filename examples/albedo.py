@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """How much light a rough surface reflects, by angle: a million samples for each of ten angles, here or, with an address, on a
 server. Usage: albedo.py [unix:PATH|HOST:PORT]"""
 import sys

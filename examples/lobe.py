@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Plots where a rough metal reflects light from one direction: the model's curve, and a histogram of samples, which must follow it.
 Usage: lobe.py OUTPUT.png [unix:PATH|HOST:PORT]"""
 import sys

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A lobe in C: a million reflections of one direction, sampled here or, with an address, by a server.
  * cc sample.c -lfacetwise -lm && ./a.out [unix:PATH|HOST:PORT] */
 #include <facetwise.h>

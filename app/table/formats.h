@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The two formats behind table.h.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // .npy tables: the file is mapped and its fields are columns with the record's length as their stride.
 #include <fcntl.h>
 #include <sys/mman.h>

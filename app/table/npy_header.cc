@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // NumPy's format: "\x93NUMPY", version (2 bytes), length of the header (2 bytes in version 1, else 4), and
 // a Python literal such as {'descr': [('ix', '<f4'), ('', '|V4')], 'fortran_order': False, 'shape': (10,)}.
 #include "app/table/npy_header.h"

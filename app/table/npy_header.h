@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The header of a .npy file: what a one-dimensional structured array consists of.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables: named float columns read from and written to CSV and .npy files.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The baseline, vectorised by the compiler. Nothing but the function below may leave this file: it is compiled for
 // instructions that not every CPU has.
 #define FACETWISE_BASELINE_BUILD auto_avx512

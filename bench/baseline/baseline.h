@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The benchmarks' baseline: plain scalar float code with std:: maths, such as an expert would write in a
 // renderer today, one path at a time. Not a kernel, and shares no code with the kernels. No policy for
 // smooth or invalid lanes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Definitions of baseline.h: GGX with Smith masking. Formulas and their sources: docs/math.md.
 #pragma once
 

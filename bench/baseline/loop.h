@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The baseline in plain loops over columns, compiled as scalar code and for auto-vectorisation.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The baseline's loops. Model and sampler are template arguments, as they would be fixed in a renderer's loop, and
 // what the loop has no use for (the weight) is not computed.
 #pragma once

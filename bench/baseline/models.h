@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Definitions of baseline.h for the models besides GGX with Smith masking. Formulas and their sources: docs/models.md.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The baseline as it is: scalar code.
 #include "bench/baseline/loops.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The C interface (facetwise.h): names to the library's fields and values, errors to codes and text.
 #include "facetwise.h"
 

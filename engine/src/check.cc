@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The checks of a call, made once before anything is read or written.
 #include "src/check.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // compact(): accepted lanes of finished columns, stable in order.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which models, samplers and operations fit together.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One table of kernels per target; the choice between them. The only file that knows Highway's targets.
 #include <type_traits>
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // All distributions, in the order of model.h's enumeration. Each has a file src/distributions/<name>.cc.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The batch's columns as public tables, and which calls read and compute them.
 #include "src/fields.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every column of a batch, declared once. The public tables (batch.h), the indices of a tile's columns and the
 // batch's columns by these indices are made from the lists here.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The floating-point control register, set to IEEE defaults for as long as an object of this lives: callers
 // built on Embree run with denormals flushed, some round otherwise, and neither may change a result.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Names of the vocabulary's values, as used in flags, JSON and messages.
 #include <array>
 #include <utility>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A checked call and the kernel for it: all that is decided once, before the first lane.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs a range of a plan's lanes, tile by tile. Contiguous columns are used where they lie; the others, and lanes that
 // do not fill a vector, go by way of buffers.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a kernel sees: pointers to contiguous lanes. Strides, active lists, one-value columns and generated
 // numbers are resolved before (stage.h), so that kernels know nothing of them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Long computations that tell how far they are.
 #pragma once
 

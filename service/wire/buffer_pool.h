@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory for messages: blocks that are used again, so that a stream of large messages neither allocates nor
 // clears pages.
 #pragma once

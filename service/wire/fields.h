@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where the batch's columns are in the messages.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reads a protobuf message as gRPC received it, in slices: large fields go straight to where they belong.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes a protobuf message into one block of memory: small fields as bytes, columns as room that the caller
 // (or the engine) fills, so that no value is copied on its way out.
 #pragma once

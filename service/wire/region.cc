@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "wire/region.h"
 
 #include <sys/socket.h>

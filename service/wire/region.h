@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory that a client shares with a server on the same machine: how it is handed over. The server takes it on a Unix socket of
 // its own, beside the one for calls; the region is the server's as long as that connection stands.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // bench and summary, as processes.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Running the facetwise command as a process.
 #pragma once
 

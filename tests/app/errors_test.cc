@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What goes wrong says what and where, sets the exit code, and writes nothing.
 #include <gtest/gtest.h>
 

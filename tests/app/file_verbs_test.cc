@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample, pdf and evaluate as a process: what is written is what the library computes, bit for bit.
 #include <gtest/gtest.h>
 

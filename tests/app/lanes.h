@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lanes for the tests of the command, as files and as a batch.
 #pragma once
 

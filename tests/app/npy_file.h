@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // .npy files for tests, written byte by byte rather than by the code under test.
 #pragma once
 

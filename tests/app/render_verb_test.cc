@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // render: the command's pictures.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // serve, info, verify and help, as processes.
 #include <gtest/gtest.h>
 
@@ -168,7 +169,7 @@ TEST(Transport, MeasuresEveryWay) {
     EXPECT_GT(cost["nanoseconds"], 0);
     ways.insert(cost["way"]);
   }
-  EXPECT_EQ(ways.size(), 7u);
+  EXPECT_EQ(ways.size(), 9u);
   EXPECT_TRUE(ways.contains("shared memory"));
   EXPECT_EQ(facetwise({"transport", "--tls-ca", "x"}).code, 2);
 }

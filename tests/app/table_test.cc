@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // CSV and .npy tables.
 #include "app/table/table.h"
 

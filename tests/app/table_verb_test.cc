@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // table: what is built once and saved gives the same samples as the text it was built from.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // verify finds one wrong bit, wherever it is, and nothing where nothing is wrong.
 #include "app/verify.h"
 

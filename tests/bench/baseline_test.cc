@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The scalar baseline computes what the reference does, to float's accuracy: it is an honest thing to compare
 // with.
 #include "bench/baseline/baseline.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which benchmarks there are, and which a filter chooses.
 #include "bench/case.h"
 

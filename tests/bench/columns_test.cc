@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The columns that benchmarks use are placed as they say, and all implementations compute the same from them.
 #include "bench/columns.h"
 

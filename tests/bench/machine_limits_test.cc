@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The machine's limits are measured: they do the work they say, and take the time it takes.
 #include "bench/machine_limits.h"
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # own_names.sh LIBRARY NAME...: the object NAME.cc.o of the library defines nothing that others could call but what has
 # NAME in it.
 library=$1

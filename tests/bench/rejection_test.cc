@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rejection counts meet their predictions, and predictions those of other means.
 #include "bench/rejection.h"
 

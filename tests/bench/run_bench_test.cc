@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // run_bench(): a small run from end to end, its errors, and how it is stopped.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The performance to reach: every row is measured, or says why not. Whether it is met is not tested: that is
 // for a quiet machine.
 #include "bench/targets.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The C interface from C: every operation, errors by name, tables, generators, active lanes; with an address the same calls
  * on a server, which give the same bits. c_test [ADDRESS] */
 #include <facetwise.h>

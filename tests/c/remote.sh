@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Runs a program against a server of its own: remote.sh SERVER PROGRAM
 set -euo pipefail
 folder=$(mktemp -d)

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The library shows only what facetwise.h declares, all of it, and has a versioned name: symbols.sh LIBRARY HEADER
 set -euo pipefail
 shown=$(nm -D --defined-only "$1" | awk '{print $3}' | sed 's/@.*//' | sort)

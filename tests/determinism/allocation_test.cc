@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A call allocates nothing of its own. This program counts what goes through operator new.
 #include <atomic>
 #include <cstdlib>

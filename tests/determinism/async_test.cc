@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Calls as futures: the same answers as calls, no more at once than the window, and none left behind.
 #include "facetwise/async.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ColumnMemory: columns begin at cache lines, apart in their pages, and hold their lanes.
 #include "facetwise/column_memory.h"
 

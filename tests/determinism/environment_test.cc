@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The caller's floating-point control register changes no result and is left as it was: callers built on
 // Embree flush denormals, some round otherwise, some trap.
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The target that is asked for is the one that runs: a profile of the running calls names its kernels.
 // Highway puts a target's code into a namespace of its own (N_AVX2 and so on), and this program exports its
 // symbols, so that a sampled program counter gives the name of the kernel that it is in.

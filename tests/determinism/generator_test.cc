@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The in-kernel generator: the same results as columns of Philox's numbers (support/philox.h), which belong
 // to a lane's id.
 #include <cstring>

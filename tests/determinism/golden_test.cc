@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every target of every architecture gives the committed bits.
 #include <cstdlib>
 #include <fstream>

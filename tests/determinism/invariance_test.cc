@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bits of a lane do not depend on how the batch that it is in was passed, split or run.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A lane's results depend only on its inputs: any length on every target, any order, outputs over any
 // inputs.
 #include "determinism/compare.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where columns lie in their cache lines changes nothing, and nothing is touched outside of them: all at one offset and
 // each at its own, at the edge of pages that cannot be read or written, with streaming stores and without.
 #include <sys/mman.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where columns lie changes nothing: any 4-byte alignment, any stride, each column its own.
 #include <cstring>
 #include <memory>

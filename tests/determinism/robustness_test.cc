@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whatever goes in: finite, non-negative, the status that model.h's policy says, and no lane disturbs another.
 #include <gtest/gtest.h>
 

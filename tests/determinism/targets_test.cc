@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every target gives the same bits, and one that is not there says so.
 #include <algorithm>
 #include <map>
@@ -17,7 +18,8 @@ void expect_targets_agree(const Lanes& lanes) {
     for (const Target target : available_targets())
       for (const bool one_lane : {false, true}) {
         SCOPED_TRACE(std::string(name(target)) + (one_lane ? ", one lane" : ""));
-        expect_same(call, expected, compute(call, lanes, {.target = target, .one_lane = one_lane, .threads = Threads::one}));
+        expect_same(call, expected,
+                    compute(call, lanes, {.target = target, .one_lane = one_lane, .threads = Threads::one}));
       }
     if (testing::Test::HasFailure()) return;
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Threads change nothing: neither how many, nor whose arena, nor other calls at the same time.
 #include <thread>
 

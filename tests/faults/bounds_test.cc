@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Nothing is read or written outside the columns: buffers of exactly the size, so that AddressSanitizer sees
 // an overrun, and others amid NaN and guard values, so that any build does.
 #include <bit>

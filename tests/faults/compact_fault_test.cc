@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Malformed compactions: refused by name, and nothing is written.
 #include "facetwise/engine.h"
 #include "gtest/gtest.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // compact(): accepted lanes, in order, whatever the threads.
 #include "facetwise/engine.h"
 #include "gtest/gtest.h"

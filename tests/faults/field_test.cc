@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Each column of each operation: missing, unknown, of the wrong length, null, misaligned, badly strided.
 #include "faults/malformed_call.h"
 

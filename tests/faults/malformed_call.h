@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A call that a test spoils in one way, and the proof that it is refused and writes nothing.
 #pragma once
 

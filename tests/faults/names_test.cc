@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Names and tables of the vocabulary.
 #include <set>
 
@@ -33,7 +34,8 @@ TEST(Names, RoundTrip) {
   expect_round_trip({Target::best, Target::scalar, Target::avx2, Target::avx3, Target::neon}, parse_target);
   expect_round_trip({Operation::sample_normal, Operation::sample_reflection, Operation::pdf_reflection,
                      Operation::evaluate_reflection, Operation::masking, Operation::sample_transmission,
-                     Operation::evaluate_transmission, Operation::sample_scattering, Operation::evaluate_scattering, Operation::albedo},
+                     Operation::evaluate_transmission, Operation::sample_scattering, Operation::evaluate_scattering,
+                     Operation::albedo},
                     parse_operation);
   EXPECT_EQ(name(Sampler::cap), "cap");
   EXPECT_EQ(name(LaneStatus::accepted), "accepted");

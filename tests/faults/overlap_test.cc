@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Overlap of outputs with inputs, with each other and with the active list.
 #include <cstring>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is asked for: enumerations, samplers that do not fit, random numbers, active lists, no lanes.
 #include "faults/malformed_call.h"
 

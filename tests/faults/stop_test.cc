@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Execution::stop ends a call between tiles.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A CompactRequest from a stranger, from its bytes to the answer's.
 #include "tests/fuzz/server_call.h"
 

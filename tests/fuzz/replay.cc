@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Runs a fuzz target over the files of folders, in no more memory than a small input may take.
 #include <sys/resource.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Answers one message as the server does, within small limits.
 #pragma once
 

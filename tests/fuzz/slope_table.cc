@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bytes of tables: of slopes and of albedo. What is taken is used.
 #include "facetwise/slope_table.h"
 

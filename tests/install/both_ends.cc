@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A program outside with a server and a client in it: the installed components, and one batch between them.
 #include <cstdio>
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A program outside: finds the installed package, samples a batch, compares one lane with the reference.
 #include <cmath>
 #include <cstdio>

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Makes the .deb packages, installs them on a bare Debian 12 (debootstrap, as root), uses what they bring, and removes them.
 # packages.sh BUILD SOURCE. Takes some minutes and needs dpkg-dev, file and debootstrap.
 set -euo pipefail

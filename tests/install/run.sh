@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # Installs the build into a fresh folder, and uses it from outside: programs in C++ and C, the command, its manual, Python.
 # run.sh BUILD SOURCE
 set -euo pipefail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exponentials, logarithms and the normal distribution's integrals against long double, to the errors that their headers and
 // docs/numerics.md state; the same bits on every target.
 #include <cstddef>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Philox4x32-10: the tests' own against Random123's known answers, and every target's kernel against that.
 #include "support/philox.h"
 

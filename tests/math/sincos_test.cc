@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // SinCosTurn against double, over every u that the generator can make, and the same bits on every target.
 #include <cstddef>
 #include <cstdint>

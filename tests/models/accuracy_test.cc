@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Densities, values and projected areas of every composition against the double-precision reference.
 //
 // Errors are relative, in units of 2^-24. The reference is evaluated at the kernels' own float inputs. What

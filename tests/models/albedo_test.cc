@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Directional albedo and compensation: against the reference's quadrature, a furnace, and Turquin's formula.
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The chi-square test can fail: it rejects a density off by a few per cent, on the very samples for which it
 // accepts the right one.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which models, samplers and operations fit together, and what is said where they do not.
 #include <gtest/gtest.h>
 

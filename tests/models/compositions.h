@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every composition of a model with a sampler, called lane by lane: what the tests of this folder loop over.
 #pragma once
 

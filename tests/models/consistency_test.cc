@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples agree with queries, and nothing upsets a lane: every composition.
 #include <gtest/gtest.h>
 

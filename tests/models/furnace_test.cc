@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Energy: mean weights are the albedo, at most 1, and light may be traced either way.
 #include <gtest/gtest.h>
 

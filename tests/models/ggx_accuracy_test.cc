@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The kernels against the double-precision reference, lane by lane, for every operation.
 //
 // Errors are in units of 2^-24: of directions and cosines absolute, of the rest relative. Most lanes are

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The kernels' samples follow the reference's density: chi-square for every sampler and configuration.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A sample's pdf is what the pdf call says of its direction, as far as o's rounding to float lets it.
 //
 // Moving o by d moves log p by at most about d times

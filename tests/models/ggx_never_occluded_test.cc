@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `exact` loses no sample: 10^8 over 1,000 random configurations.
 #include <gtest/gtest.h>
 

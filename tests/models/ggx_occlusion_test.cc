@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many samples each sampler loses: known shares, by K and by counting the kernels' samples.
 #include <gtest/gtest.h>
 

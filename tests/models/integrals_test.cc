@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The integral of a density over o is the share of samples that are accepted: every sampler of every family.
 #include <gtest/gtest.h>
 

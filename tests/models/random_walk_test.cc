@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What energy compensation stands for: light that walks from facet to facet of Smith's surface until it leaves (Heitz et al.
 // 2016, "Multiple-Scattering Microfacet BSDFs with the Smith Model"), in double and with nothing of the kernels. Both
 // compensations are measured against it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Retro-reflection by the back-vector: reflects as if i were turned half way about n.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Dielectrics: reflection and transmission at a microfacet, by choice or forced, of every family.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tabulated distributions through the engine: values, areas and masking against the reference with the table's own density,
 // samples against their densities, and what is refused. Radial and skewed, with Smith masking and V-cavity, with mean slopes.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `exact` never returns an occluded reflection in front, and what its weights vary by.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // ports/facetwise.hpp against the library, on lanes that look for trouble.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Reads docs/explore.html in headless Chromium: it holds the port as it is, draws, loses nothing by exact, follows the sliders by
 keyboard, prints no errors, asks the network for nothing and keeps nobody out. Usage: explore_in_a_browser.py PAGE PORT AXE"""
 import json

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Runs ports/facetwise.glsl in headless Chromium (WebGL2, on SwiftShader where there is no GPU) on hard lanes, and compares it
 with the library. Usage: glsl_in_a_browser.py FACETWISE PORT"""
 import base64

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Dask arrays: bits that do not depend on chunks, here, on a server and on a cluster of three processes of which one is killed.
 Usage: dask_test.py SERVER"""
 import os

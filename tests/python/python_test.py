@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """The Python package: local and remote bits are equal, and those of the command; arrays are read and written where they lie;
 errors name the field. Usage: python_test.py SERVER FACETWISE"""
 import os

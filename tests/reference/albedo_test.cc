@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The mean of a sampler's weights is the albedo.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Closed forms against the integrals that define them, for every distribution.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Densities of every model and sampler integrate to the share that is accepted, and values keep energy and
 // reciprocity.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Roughness and directions at the ends of what is valid: everything stays finite, and densities keep their
 // integrals.
 #include <gtest/gtest.h>

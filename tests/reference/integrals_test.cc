@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Integrals that the definitions must satisfy, by quadrature of the double-precision reference.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Quadrature over standard slopes, which knows only the definitions: slopes, normals, where they face i and
 // where their reflections are not occluded. Shares nothing with the reference's own quadrature.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // White light from everywhere: what comes back from a plate is its albedo, by every model and however directions are
 // drawn. With the environment sampled too, a wrong value or pdf shows as well as a wrong weight.
 #include <gtest/gtest.h>

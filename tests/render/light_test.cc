@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Light probes as lights: drawn directions follow the stated density, which integrates to one.
 #include "src/light.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How different two pictures look: a simple kin of FLIP (Andersson et al. 2020). Both are blurred as an eye at arm's length
 // blurs them, and the distance of their colours in CIELAB (HyAB: |L| apart plus the distance in a, b) is averaged and scaled
 // so that 1 is about black against white.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures show what is wrong: small stored references are met by the engine, and missed by one whose pdf is a little off, in
 // RMSE and in how different they look. FACETWISE_WRITE_REFERENCES=FOLDER makes the references anew.
 #include <ImfRgbaFile.h>

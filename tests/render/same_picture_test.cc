@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The same seed gives the same picture, bit for bit: here or on a server, on one thread or more, in one go or resumed.
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes: real files, those made by code, and what is wrong with others.
 #include <gtest/gtest.h>
 

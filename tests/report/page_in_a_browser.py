@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Makes reports with the command and reads them in headless Chromium: no errors, everything drawn, the slider works by
 keyboard, nothing keeps a screen reader out, on a phone and on paper too. Usage: page_in_a_browser.py FACETWISE AXE"""
 import base64

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the tests of the protocol itself share: stubs to one server, and a request that is good.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Columns in memory of their own, contiguous or strided, that can be compared to the last byte.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A client of grpc.health.v1, whose .proto Debian does not package: two messages of one field each, written
 // and read by hand (a request is string service = 1, a response enum status = 1).
 #pragma once

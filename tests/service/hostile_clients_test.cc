@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Clients that send slowly, receive slowly, or do nothing: the server's memory and threads stay within its limits, others
 // are answered meanwhile, and afterwards all is as before.
 #include <fcntl.h>

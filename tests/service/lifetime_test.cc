@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A server's life: sockets and locks, limits, clients that go away, draining.
 #include <signal.h>
 #include <sys/socket.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Servers that are absent, killed, stopped, drained or busy: a batch is answered as long as one is there, completely, once and
 // right.
 #include <signal.h>

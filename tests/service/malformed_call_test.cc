@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Requests that mean nothing: each gets a status that names the field, and the server answers the next call.
 #include <cmath>
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What those see who look after a server: counts and load for Prometheus, logs, and who may connect to a Unix socket.
 #include <arpa/inet.h>
 #include <signal.h>

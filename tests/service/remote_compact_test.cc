@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compaction by a server gives what the local engine's does, piece by piece and stable in order.
 #include <string>
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The remote engine gives what the local one does, to the last byte, whatever the columns look like.
 #include <signal.h>
 #include <unistd.h>

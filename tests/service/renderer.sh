@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
 # The example renderer gives one picture, whatever its threads, here and on a server in another process: renderer.sh SERVER RENDERER
 set -euo pipefail
 folder=$(mktemp -d)

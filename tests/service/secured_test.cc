@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // TLS, clients' certificates and tokens: who is answered, and who is not. Certificates are made here, by openssl.
 #include <cstdio>
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A facetwise server in a process of its own, for as long as the object lives.
 #pragma once
 

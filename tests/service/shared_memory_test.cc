@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Columns in memory that client and server share: the same bits without sending them; and clients and servers that die, stop, lie
 // or are somebody else.
 #include "facetwise/shared_memory.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables of slopes: uploaded by the engine by itself, listed, deleted, lost with a server, refused.
 #include <cmath>
 #include <thread>

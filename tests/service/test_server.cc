@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A server process for the tests: the library's serve() with its limits as flags. Prints each address that it
 // listens on, then "ready". Its Benchmark call answers with made-up results, slowly, so that tests can watch.
 #include <sys/resource.h>

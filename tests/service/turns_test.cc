@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the server's calls share, without gRPC: room, limits and turns, by many threads at once. ThreadSanitizer sees all of
 // it, which it does not where gRPC, whose locks it does not know, hands a call from one thread to another.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Calls of the engine for tests that treat all operations alike: inputs made only by integer hashing, so that
 // every machine has the same, and outputs to compare bit by bit.
 #pragma once
@@ -22,7 +23,7 @@ struct Call {
   Sampler sampler;
   Shadowing shadowing;
   Model model{};              // but for its shadowing
-  bool affine = false;       // mean slopes and correlated roughness too
+  bool affine = false;        // mean slopes and correlated roughness too
   bool values_alone = false;  // evaluate_reflection without its pdf, for which the sampler is not read
 };
 std::string call_name(const Call& call);

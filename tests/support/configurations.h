@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The configurations that samplers are tested on, fixed once.
 #pragma once
 

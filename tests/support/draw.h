@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samples of the kernels for one incident direction and roughness, from the generator.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // More lanes that look for trouble, in blocks of unlike kinds: made, as those of call.h are, of integer
 // hashes and of
 // only + - * / and square roots, so that every machine has the same bits.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whether the kernels' samples follow a density: the chi-square test over cells of the stretched frame.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lanes to compare implementations on: random ones, and adversarial ones.
 #pragma once
 

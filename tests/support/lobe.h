@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Integrals over the lobe of one incident direction, by quadrature in the stretched frame.
 //
 // A microfacet normal m is seen as m_hat ~ (m_x / alpha_x, m_y / alpha_y, m_z), of unit length, by its polar

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Philox4x32-10 (Salmon, Moraes, Dror, Shaw 2011, section 4.3), written from the paper and checked against
 // Random123's known answers (tests/math/philox_test.cc).
 #pragma once

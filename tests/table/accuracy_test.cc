@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How near the drawn slopes are to the visible ones, by size of table; printed for docs/tables.md.
 #include <algorithm>
 #include <chrono>

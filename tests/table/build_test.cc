@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a table holds: the density, normalised, and its projected area; and what is refused.
 #include <cmath>
 #include <limits>

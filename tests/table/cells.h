@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cells of the visible slopes of an incident direction: equal steps in the share f of the visible tilts'
 // tan(chi / 2) and in the side h.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Densities of slopes that the tests tabulate.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables as bytes: the same bits come back, and nothing else is taken.
 #include <cstring>
 #include <filesystem>

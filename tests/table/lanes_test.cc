@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The lane functions: near those in double, and the same bits on every target and in every width.
 #include <cstddef>
 

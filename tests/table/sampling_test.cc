@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The drawn slopes: they follow the density that is returned with them, always; the visible slopes' density,
 // if the table is not too small.
 #include <algorithm>

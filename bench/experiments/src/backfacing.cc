@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tokuyoshi 2021, "Unbiased VNDF Sampling for Backfacing Shading Normals": the five configurations of V-cavities (figure 1 of
 // the supplement) and a normal-mapped scene by the older and the unbiased normalisation (figure 2).
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Eto & Tokuyoshi 2023, "Bounded VNDF Sampling for Smith-GGX Reflections": figures 1 and 3 to 6, and what `exact` adds.
 #include <fmt/format.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Heitz & d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs with the Distribution of Visible Normals": convergence in a
 // white furnace (tables 1 and 2 of the supplement) and the rough glass plate (its figures 3 to 15).
 #include <fmt/format.h>

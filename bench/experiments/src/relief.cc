@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Non-centred distributions (Heitz & d'Eon 2014, section 4 of the supplement; LEADR: Dupuy et al. 2013): a displaced surface
 // seen from afar by moments of its slopes, against its geometry.
 #include <fmt/format.h>

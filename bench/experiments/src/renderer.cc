@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a renderer gains in the end: whole pictures by the engine and by the scalar baseline, on one thread and on all.
 #include <fmt/format.h>
 #include <tbb/info.h>

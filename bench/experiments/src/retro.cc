@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Raab 2025, "Properties of the Back-vector Modification for Microfacet BRDF Models": an orb that reflects back, energy,
 // and symmetry.
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A post of 2015 on sampling visible normals of GGX: wasted samples by method and angle, the range of the weights, and
 // pictures.
 #include <fmt/format.h>

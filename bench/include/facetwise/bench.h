@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The benchmarks: throughput of the library's operations, the machine's limits, and rejection counts.
 // How to read them: docs/benchmarks.md.
 #pragma once

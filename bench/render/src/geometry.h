@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The scene's triangles in Embree, traced in packets.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reading pictures: EXR with OpenEXR, the rest with stb.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>

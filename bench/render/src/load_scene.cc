@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes from files.
 #include <assimp/GltfMaterial.h>
 #include <assimp/material.h>

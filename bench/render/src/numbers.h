@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Random and low-discrepancy numbers of paths: each belongs to a pixel, a sample and a dimension, whatever the order of
 // work.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writing pictures, and reading our own to go on from.
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>

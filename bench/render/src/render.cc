@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The wavefront: all paths of a wave take each step together.
 #include "facetwise/render.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The renderer's calls answered by the benchmarks' baseline, one path after another in plain code.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

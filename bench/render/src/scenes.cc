@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes and shapes made by code.
 #include <algorithm>
 #include <cmath>

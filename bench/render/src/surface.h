@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a ray meets the scene: what shading needs of it.
 #pragma once
 

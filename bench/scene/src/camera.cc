@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tracing with Embree.
 #include <embree3/rtcore.h>
 #include <tbb/blocked_range.h>

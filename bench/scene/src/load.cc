@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reading a mesh with assimp.
 #include <assimp/matrix3x3.h>
 #include <assimp/postprocess.h>

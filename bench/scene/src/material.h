@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Procedural materials: a normal map and roughness as functions of the point. Exact float operations only,
 // so that they are the same everywhere.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables of directional albedo: what share of the light from i a rough surface reflects by one scattering, with F = 1.
 // What is missing in it is scattered again inside the surface, and is what energy compensation puts back. docs/albedo.md
 // has the design and the measured errors.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Calls that run while their caller goes on: the next batch is made while earlier ones are computed, or on their way to servers.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The batch: what every operation, local or remote, takes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Columns: how batches of values are passed. The caller owns the memory; no call keeps a column.
 #pragma once
 

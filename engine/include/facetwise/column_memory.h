@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory for columns, placed so that calls run at full speed.
 #pragma once
 

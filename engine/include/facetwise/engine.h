@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The library's calls. A program that may run remotely holds an Engine; one that never will may call the
 // free functions.
 #pragma once

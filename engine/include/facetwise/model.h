@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is sampled and how: distribution, masking, shadowing, sampler, lane status.
 //
 // Conventions, everywhere in facetwise. Directions are unit vectors in the local frame (z is the shading

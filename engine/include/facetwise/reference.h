@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The truth: double precision, one lane at a time, written straight from the definitions. Slow. Shares no
 // code with the kernels, so that agreement means something. Inputs are taken as they are: no policy for
 // smooth or invalid lanes.

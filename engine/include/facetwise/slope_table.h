@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tabulated distributions of microfacet normals: any density of slopes, its projected area, and its visible
 // normals sampled by two inverse tables (Heitz & d'Eon 2014, Algorithm 4). docs/tables.md has the design.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables of albedo as bytes and files, and those that the process keeps.
 //
 // The bytes (src/table/sealed.h): 8 of magic, the version, distribution, masking and shadowing as uint32, the id of the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Computes a table of albedo by the engine's own samples: the mean of their weights.
 #include <algorithm>
 #include <bit>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How a table of albedo lies in memory.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Beckmann's kernels.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/distributions/beckmann.cc"

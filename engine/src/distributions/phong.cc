@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Phong's kernels.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "src/distributions/phong.cc"

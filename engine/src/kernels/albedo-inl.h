@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Directional albedo by its table: docs/albedo.md.
 
 #if defined(FACETWISE_ALBEDO_INL_H_) == defined(HWY_TARGET_TOGGLE)

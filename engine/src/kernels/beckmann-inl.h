@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Beckmann: pi P22 = e^(-r^2). With k = w_z / sqrt(A) the projected area is 2 sigma = sqrt(A) (k erfc(-k) + e^(-k^2) /
 // sqrt(pi)); for k < 0 it is sqrt(A) e^(-k^2) tail(-k), tail as in erf-inl.h. There densities and areas are kept times
 // e^(shift), shift = k^2.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Beckmann's visible normals whose reflection is not occluded, nearly in proportion, for i_z > 0: docs/math.md. Slopes
 // are rotated into the plane of incidence. There x is a visible slope between x_a and x_b, and y a normal one between
 // the ends of the ellipse's chord at x.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What share of the light a microfacet reflects.
 
 #if defined(FACETWISE_FRESNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // GGX: 2 sigma(i) = w_z + nu; D(m) = (M.M)^2 / (|m_hat|^4 pi ax ay).
 
 #if defined(FACETWISE_GGX_INL_H_) == defined(HWY_TARGET_TOGGLE)

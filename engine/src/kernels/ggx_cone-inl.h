@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The cone of GGX's unoccluded normals, for i_z > 0. Derivation: docs/math.md, "The exact reflection sampler"; the
 // symbols are those used there.
 

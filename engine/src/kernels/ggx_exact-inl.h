@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The exact reflection sampler of GGX with Smith masking: docs/math.md.
 
 #if defined(FACETWISE_GGX_EXACT_INL_H_) == defined(HWY_TARGET_TOGGLE)

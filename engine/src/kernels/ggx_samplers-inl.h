@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The published samplers of GGX with Smith masking: ndf, heitz, cap, bounded.
 
 #if defined(FACETWISE_GGX_SAMPLERS_INL_H_) == defined(HWY_TARGET_TOGGLE)

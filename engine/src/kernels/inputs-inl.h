@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What operations read: loaded, tested and turned into the principal frame.
 
 #if defined(FACETWISE_INPUTS_INL_H_) == defined(HWY_TARGET_TOGGLE)

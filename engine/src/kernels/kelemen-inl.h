@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The lobe that Kelemen & Szirmay-Kalos 2001 add for the light that is scattered more than once:
 // F_ms (1 - E(i)) (1 - E(o)) / (pi (1 - mean E)), drawn by the cosine with the share 1 - E(i). docs/albedo.md.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The lane policy (model.h): which lanes are ordinary, smooth or invalid, and what those compute and return that are
 // not.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How outputs leave a kernel.
 
 #if defined(FACETWISE_OUTPUT_INL_H_) == defined(HWY_TARGET_TOGGLE)

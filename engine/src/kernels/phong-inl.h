@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Anisotropic Phong: D = m_z^n / (pi ax ay) with n = 2 cos^2 / ax^2 + 2 sin^2 / ay^2 - 2 of m's azimuth. Of a standard
 // slope of length rho whose actual length is r, pi P22 = (1 + r^2)^-(1 + rho^2 / r^2). The share of the slopes of an
 // azimuth e beyond rho is (1 + a rho^2)^(-1 / a), a = ax^2 e_x^2 + ay^2 e_y^2 = r^2 / rho^2.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // pdf_reflection, evaluate_reflection and masking, written once over surfaces, samplers and vector widths.
 
 #if defined(FACETWISE_QUERY_INL_H_) == defined(HWY_TARGET_TOGGLE)

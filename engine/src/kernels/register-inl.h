@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From policies to tables of kernels. Include it in a distribution's own file, inside foreach_target.
 
 #if defined(FACETWISE_REGISTER_INL_H_) == defined(HWY_TARGET_TOGGLE)

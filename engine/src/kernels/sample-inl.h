@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sample_normal and sample_reflection, written once over surfaces, samplers and vector widths.
 
 #if defined(FACETWISE_SAMPLE_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What all samplers share.
 //
 // A sampler draws M = L m_hat and says by what N the density is normalised: p(o) = D(m) / (4 N). For visible

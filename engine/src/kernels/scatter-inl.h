@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A dielectric's two events at a microfacet: reflection and transmission (Walter 2007), chosen by u3 or forced to
 // transmit.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samplers by slopes, for distributions that are no stretched sphere: m_hat = (-x, -y, 1) for a standard slope (x, y).
 
 #if defined(FACETWISE_SLOPES_INL_H_) == defined(HWY_TARGET_TOGGLE)

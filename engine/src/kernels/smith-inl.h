@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Smith masking: visible normals have density D(m) (i.m) / sigma(i), and reflections D(m) / (4 sigma(i)).
 
 #if defined(FACETWISE_SMITH_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Student-t of gamma = 3: pi P22 = 8 / (2 + r^2)^3. With slopes measured by sqrt(2) alpha it is 2 / (1 + r^2)^3, the
 // normals of a sphere weighted by 2 m_hat_z^2, and all is algebraic: for a w that is stretched so, of length nu, 2 sigma = (nu +
 // w_z)^2 / (2 nu).

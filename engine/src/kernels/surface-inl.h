@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What kernels are composed of: a surface is a distribution with a masking, its slopes standard ones stretched by
 // the roughness and, if it is affine, rotated (correlated roughness) and moved (mean slope) too.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tabulated distributions: docs/tables.md. Samples have the density of what the interpolated tables draw, so N follows
 // from that: for a density p of standard normals m_hat (unit), p(m) is p (|m| / |m_hat|)^3 / (ax ay) and 2 N = 2 i.m
 // D_hat / (p |m_hat|).

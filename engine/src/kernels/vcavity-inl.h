@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // V-cavity masking, single-sided: G(i, m) = min(2 m_z |i_z| / i.m, 1) (Tokuyoshi 2021, section 2). Visible normals have
 // density D(m) min(2 m_z |i_z|, i.m) / (H |i_z|), so N = H max(i.m / (2 m_z), |i_z|), with the hit probability H, 1 in
 // front. Incident's t and tn are 2 H.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Samplers for V-cavity masking, of distributions that draw slopes.
 
 #if defined(FACETWISE_VCAVITY_SAMPLERS_INL_H_) == defined(HWY_TARGET_TOGGLE)

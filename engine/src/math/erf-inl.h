@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The normal distribution's integrals. e^(-x^2) / sqrt(pi) is the density of Beckmann's slopes.
 
 #if defined(FACETWISE_ERF_INL_H_) == defined(HWY_TARGET_TOGGLE)

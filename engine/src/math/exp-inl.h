@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Exponential function.
 
 #if defined(FACETWISE_EXP_INL_H_) == defined(HWY_TARGET_TOGGLE)

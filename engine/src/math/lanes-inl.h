@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The vector operations that kernels are made of. Only operations with one IEEE result are used (+ - * / sqrt,
 // fused multiply-add, comparisons, selects, integers), so that every target gives the same bits.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Natural logarithm.
 
 #if defined(FACETWISE_LOG_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Philox4x32-10: Salmon, Moraes, Dror, Shaw 2011, "Parallel random numbers: as easy as 1, 2, 3".
 
 #if defined(FACETWISE_PHILOX_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Inverse roots of odd order.
 
 #if defined(FACETWISE_ROOTS_INL_H_) == defined(HWY_TARGET_TOGGLE)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sine and cosine of a whole turn's fraction.
 
 #if defined(FACETWISE_SINCOS_INL_H_) == defined(HWY_TARGET_TOGGLE)

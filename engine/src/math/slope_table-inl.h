@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tabulated distributions (facetwise/slope_table.h) in lanes: docs/tables.md. src/table/layout.h says what a
 // tilt and a side are.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Integrals over unoccluded normals, by quadrature along rays of standard slopes.
 #include <algorithm>
 #include <cmath>

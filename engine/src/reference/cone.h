@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The elliptic cone of normals whose reflection is not occluded: docs/math.md, "The exact reflection
 // sampler", where the symbols are introduced.
 #pragma once

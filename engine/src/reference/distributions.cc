@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Distributions of slopes and their projected areas: docs/models.md, "Distributions".
 #include <limits>
 #include <numbers>

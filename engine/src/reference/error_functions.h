@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The error function's relatives that do not underflow.
 #pragma once
 

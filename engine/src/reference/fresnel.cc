@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How much a microfacet reflects: docs/models.md, "Interfaces".
 #include <cmath>
 

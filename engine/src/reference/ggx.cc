@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // GGX with Smith masking: distribution, areas, shadowing. Sources of each formula: docs/math.md.
 #include <cmath>
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Masking, and what densities of visible normals are divided by: docs/models.md, "Maskings".
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Phong with V-cavity from behind: docs/models.md, "V-cavity".
 #include <algorithm>
 #include <cmath>

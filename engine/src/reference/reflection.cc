@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Densities and values of reflections, every model: docs/models.md.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The samplers: their densities and their mappings from uniform numbers (model.h).
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Numbers as mantissa * exp(exponent): densities and areas of a Gaussian underflow far behind the surface,
 // where their quotients do not.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a Surface's functions share: the stretched frame and quantities that may underflow.
 #pragma once
 

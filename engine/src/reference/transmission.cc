@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Transmission, and the choice between it and reflection: docs/models.md, "Transmission".
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `exact`: normals whose reflection is not occluded, i_z > 0. docs/models.md, "Unoccluded reflections".
 #include <algorithm>
 #include <cmath>

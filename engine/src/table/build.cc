@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables of a density of slopes.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables as bytes and files, and slopes as text.
 //
 // The bytes (sealed.h): 8 of magic, the version and the six sizes of TableSizes as uint32, 4 bytes of 0, the values.
@@ -35,7 +36,8 @@ constexpr float kLargestValue = 1e12f;
 // What builders make: kernels need no more than sizes in order, but a sample needs rows that rise.
 absl::Status check_values(const TableSizes& sizes, std::span<const float> values) {
   for (std::size_t k = 0; k < sizes.density() + sizes.area(); ++k)
-    if (!(values[k] >= 0 && values[k] <= kLargestValue)) return invalid("a density or area of ", values[k], "; rebuild it");
+    if (!(values[k] >= 0 && values[k] <= kLargestValue))
+      return invalid("a density or area of ", values[k], "; rebuild it");
   const auto rows = values.subspan(sizes.density() + sizes.area());
   const std::size_t nodes = std::size_t{sizes.uniforms} + 1;
   for (std::size_t row = 0; row < rows.size(); row += nodes) {

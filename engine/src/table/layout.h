@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How a table's values lie in memory, and what its axes mean.
 //
 // A normal has a tilt chi in the plane of incidence and a side h across it:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables as bytes: a header, the values as float32 and the FNV-1a hash of all before as uint64, little-endian. A header
 // begins with 8 bytes of magic and the version as uint32, and has `sizes` with a total().
 #pragma once

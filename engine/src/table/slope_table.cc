@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A table in double.
 #include "facetwise/slope_table.h"
 

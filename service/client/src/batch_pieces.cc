@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <string>
 
@@ -6,6 +7,7 @@
 #include "facetwise/v1/sampler.pb.h"
 #include "src/gather.h"
 #include "src/pieces.h"
+#include "wire/compact_columns.h"
 #include "wire/fields.h"
 #include "wire/message_reader.h"
 #include "wire/message_writer.h"
@@ -20,11 +22,13 @@ absl::Status bad_answer(absl::string_view what) { return absl::InternalError(abs
 
 }  // namespace
 
-BatchPieces::BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits, const SharedMemory* shared)
+BatchPieces::BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits, const SharedMemory* shared,
+                         bool compact)
     : operation_(operation),
       batch_(batch),
       positions_(batch.lanes, batch.active),
       shared_(positions_.all() ? shared : nullptr),
+      compact_(compact),
       // Without ids of their own, lanes that are not neighbours need them: first_id + index. One id for all
       // stays one value.
       sends_ids_(batch.generator && ((batch.generator->id.present() && !batch.generator->id.one_value()) ||
@@ -88,6 +92,7 @@ grpc::ByteBuffer BatchPieces::encode(std::size_t piece) const {
   if (batch.model.table != nullptr) model.set_slope_table(batch.model.table->id());
   small.set_sampler(wire::to_proto(batch.sampler));
   small.set_lanes(range.size());
+  small.set_compact_answer(compact_);
   for (int output = v1::Output_MIN; output <= v1::Output_MAX; ++output)
     if (outputs_ & (1u << output)) small.add_outputs(static_cast<v1::Output>(output));
   if (batch.generator) {
@@ -196,6 +201,39 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
     }
     return reader.skip(field);
   };
+  // A direction or a weight in half its bytes.
+  const auto read_packed = [&](const MessageReader::Field& field, v1::Output output) {
+    OutputColumn<float> columns[3];
+    std::size_t parts = 0;
+    bool wanted = false;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      if (places[k].output != output) continue;
+      wanted = wanted || (missing & (1u << k)) != 0;
+      if (missing & (1u << k)) columns[parts] = fields[k].column(batch_);
+      ++parts;
+      missing &= ~(1u << k);
+    }
+    if (!wanted) return reader.skip(field);
+    constexpr std::size_t kStaged = 1024;
+    const std::size_t lane_bytes = parts == 1 ? wire::kWeightBytes : wire::kDirectionBytes;
+    char packed[kStaged * wire::kDirectionBytes];
+    float values[3][kStaged];
+    std::size_t bytes = 0;
+    if (!reader.length(field, bytes) || bytes != range.size() * lane_bytes) return false;
+    for (std::size_t k = range.begin; k < range.end;) {
+      const std::size_t count = std::min(kStaged, range.end - k);
+      if (!reader.read(packed, count * lane_bytes)) return false;
+      if (parts == 1)
+        wire::unpack_weights(packed, count, values[0]);
+      else
+        wire::unpack_directions(packed, count, values[0], values[1], values[2]);
+      for (std::size_t part = 0; part < parts; ++part)
+        if (columns[part].present())
+          for (std::size_t j = 0; j < count; ++j) columns[part][positions_.lane(k + j)] = values[part][j];
+      k += count;
+    }
+    return true;
+  };
   bool good = true;
   while (good) {
     const auto field = reader.next();
@@ -212,6 +250,9 @@ absl::Status BatchPieces::decode(std::size_t piece, grpc::ByteBuffer& response) 
         statistics_ += {counts.accepted(), counts.occluded(), counts.smooth(), counts.invalid()};
         break;
       }
+      case Response::kCompactOutgoingFieldNumber: good = read_packed(*field, v1::OUTGOING); break;
+      case Response::kCompactNormalFieldNumber: good = read_packed(*field, v1::NORMAL); break;
+      case Response::kCompactWeightFieldNumber: good = read_packed(*field, v1::WEIGHT); break;
       case Response::kOutgoingFieldNumber:
       case Response::kNormalFieldNumber:
         good = reader.length(*field, bytes) && reader.inside(bytes, [&] {

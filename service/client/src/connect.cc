@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <mutex>
 #include <set>
@@ -30,7 +31,7 @@ class RemoteEngine final : public Engine {
 
   absl::StatusOr<Statistics> run(Operation operation, const Batch& batch) override {
     if (auto status = check(operation, batch); !status.ok()) return status;
-    BatchPieces batch_pieces(operation, batch, limits_, options_.shared_memory.get());
+    BatchPieces batch_pieces(operation, batch, limits_, options_.shared_memory.get(), options_.compact_answers);
     Pieces pieces = batch_pieces.pieces();
     const SlopeTable* table = batch.model.table.get();
     // A server that is not there gets what it needs when it is; one that has lost it (started again, not used for long) says so.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Columns in the caller's memory from and to columns without gaps.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "src/memory_offer.h"
 
 #include <poll.h>

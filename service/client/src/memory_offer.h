@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Gives a server the memory that a client shares with it, as often as the server needs it.
 #pragma once
 

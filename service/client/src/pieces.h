@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How calls become messages: a batch's lanes in pieces, each a request of its own.
 #pragma once
 
@@ -67,7 +68,9 @@ struct PieceLimits {
 class BatchPieces {
  public:
   // Columns in `shared`, if there is any, are named instead of sent.
-  BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits, const SharedMemory* shared = nullptr);
+  // `compact`: directions and weights are asked for in half their bytes.
+  BatchPieces(Operation operation, const Batch& batch, const PieceLimits& limits, const SharedMemory* shared,
+              bool compact);
   Pieces pieces();
   const Statistics& statistics() const { return statistics_; }
 
@@ -82,6 +85,7 @@ class BatchPieces {
   Batch batch_;
   Positions positions_;
   const SharedMemory* shared_;
+  bool compact_;
   bool sends_ids_;
   unsigned outputs_ = 0, shared_outputs_ = 0;  // bit (1 << v1::Output): those that are sent, and those in shared memory
   Split split_;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keeps several calls in flight over the connections, from the calling thread.
 #pragma once
 

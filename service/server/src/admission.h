@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How much a server takes on at once: calls, and bytes of messages.
 #pragma once
 

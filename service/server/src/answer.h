@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One message in, one message out: what Run, RunStream, Compact and CompactStream do with each.
 #pragma once
 

@@ -1,7 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // Run and RunStream: the request's columns are read to where the engine reads them, and the engine writes
 // the response's columns where gRPC sends them from.
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -11,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/engine.h"
 #include "src/answer.h"
+#include "wire/compact_columns.h"
 #include "wire/fields.h"
 #include "wire/message_reader.h"
 #include "wire/message_writer.h"
@@ -44,6 +47,7 @@ class Decoder {
   std::uint64_t lanes() const { return lanes_; }
   Operation operation() const { return *operation_; }
   unsigned outputs() const { return outputs_; }
+  bool compact_answer() const { return compact_answer_; }
 
  private:
   absl::Status read_field(const MessageReader::Field& field);
@@ -75,7 +79,7 @@ class Decoder {
   std::uint64_t lanes_ = 0;
   unsigned outputs_ = 0;
   std::vector<Bytes> inputs_{input_fields().size()};
-  bool has_generator_ = false;
+  bool has_generator_ = false, compact_answer_ = false;
   Generator generator_;
   Bytes generator_id_;
   v1::SharedColumns shared_;
@@ -113,6 +117,12 @@ absl::Status Decoder::read_field(const MessageReader::Field& field) {
     case Request::kModelFieldNumber: return reader_.length(field, bytes) ? read_model(bytes) : damaged_message();
     case Request::kGeneratorFieldNumber:
       return reader_.length(field, bytes) ? read_generator(bytes) : damaged_message();
+    case Request::kCompactAnswerFieldNumber: {
+      std::uint64_t value = 0;
+      const bool good = reader_.varint(field, value);
+      compact_answer_ = value != 0;
+      return good ? absl::OkStatus() : damaged_message();
+    }
     case Request::kSharedFieldNumber: return reader_.length(field, bytes) ? read_shared(bytes) : damaged_message();
     case Request::kIncidentFieldNumber:
     case Request::kOutgoingFieldNumber:
@@ -348,42 +358,90 @@ absl::Status Decoder::make_batch(const CallTools& tools, Batch& batch,
 // The response's columns, in the message that will be sent.
 class Response {
  public:
-  Response(unsigned outputs, std::size_t lanes) : outputs_(outputs), lanes_(lanes) {}
+  Response(unsigned outputs, std::size_t lanes, bool compact)
+      : outputs_(outputs), lanes_(lanes), compact_(compact ? outputs & kCompacted : 0) {}
 
+  // That are sent.
   std::size_t bytes() const {
     std::size_t bytes = 0;
     for (const auto& place : wire::output_places())
-      if (asks_for(place.output)) bytes += lanes_ * 4;
+      if (is_whole(place.output)) bytes += lanes_ * 4;
     for (const auto& place : wire::byte_places())
       if (asks_for(place.output)) bytes += lanes_;
+    for (const Packed& packed : kPacked)
+      if (is_packed(packed.output)) bytes += lanes_ * packed.lane_bytes();
+    return bytes;
+  }
+  // Of the columns that are packed, before they are.
+  std::size_t loose_bytes() const {
+    std::size_t bytes = 0;
+    for (const auto& place : wire::output_places())
+      if (is_packed(place.output)) bytes += lanes_ * 4 + kAlignment;
     return bytes;
   }
 
-  wire::MessageWriter make(Batch& batch) const {
+  wire::MessageWriter make(Batch& batch) {
     const auto places = wire::output_places();
     const auto byte_places = wire::byte_places();
     wire::MessageWriter writer(places.size() + byte_places.size(), bytes(), kStatisticsBytes, true);
+    loose_ = wire::Block(loose_bytes());
+    std::size_t at = 0;
     for (std::size_t k = 0; k < places.size(); ++k) {
-      if (!asks_for(places[k].output)) continue;
-      const int part = places[k].part;
-      if (part == 1) writer.begin(places[k].field, 3 * wire::MessageWriter::field_bytes(lanes_ * 4));
-      char* column = writer.column(part == 0 ? places[k].field : part, lanes_ * 4);
-      output_fields()[k].column(batch) = {reinterpret_cast<float*>(column), lanes_};
+      OutputColumn<float>& column = output_fields()[k].column(batch);
+      if (is_packed(places[k].output)) {
+        column = {reinterpret_cast<float*>(loose_.data() + at), lanes_};
+        at += (lanes_ * 4 + kAlignment - 1) / kAlignment * kAlignment;
+      } else if (is_whole(places[k].output)) {
+        const int part = places[k].part;
+        if (part == 1) writer.begin(places[k].field, 3 * wire::MessageWriter::field_bytes(lanes_ * 4));
+        column = {reinterpret_cast<float*>(writer.column(part == 0 ? places[k].field : part, lanes_ * 4)), lanes_};
+      }
     }
     for (std::size_t k = 0; k < byte_places.size(); ++k) {
       if (!asks_for(byte_places[k].output)) continue;
       char* column = writer.column(byte_places[k].field, lanes_);
       byte_fields()[k].column(batch) = {reinterpret_cast<std::uint8_t*>(column), lanes_};
     }
+    for (std::size_t k = 0; k < std::size(kPacked); ++k)
+      if (is_packed(kPacked[k].output)) packed_[k] = writer.column(kPacked[k].field, lanes_ * kPacked[k].lane_bytes());
     return writer;
+  }
+
+  // Lanes of the whole batch that are computed.
+  void pack(const Batch& batch, std::size_t begin, std::size_t end) const {
+    const Batch::Outputs& out = batch.out;
+    for (std::size_t k = 0; k < std::size(kPacked); ++k) {
+      if (packed_[k] == nullptr) continue;
+      char* to = packed_[k] + begin * kPacked[k].lane_bytes();
+      if (kPacked[k].output == v1::WEIGHT) {
+        wire::pack_weights(&out.weight[begin], end - begin, to);
+      } else {
+        const OutputDirection& from = kPacked[k].output == v1::OUTGOING ? out.outgoing : out.normal;
+        wire::pack_directions(&from.x[begin], &from.y[begin], &from.z[begin], end - begin, to);
+      }
+    }
   }
 
  private:
   static constexpr std::size_t kStatisticsBytes = 64;
+  struct Packed {
+    v1::Output output;
+    int field;
+    std::size_t lane_bytes() const { return output == v1::WEIGHT ? wire::kWeightBytes : wire::kDirectionBytes; }
+  };
+  static constexpr Packed kPacked[] = {{v1::OUTGOING, v1::BatchResponse::kCompactOutgoingFieldNumber},
+                                       {v1::NORMAL, v1::BatchResponse::kCompactNormalFieldNumber},
+                                       {v1::WEIGHT, v1::BatchResponse::kCompactWeightFieldNumber}};
+  static constexpr unsigned kCompacted = 1u << v1::OUTGOING | 1u << v1::NORMAL | 1u << v1::WEIGHT;
   bool asks_for(v1::Output output) const { return outputs_ & (1u << output); }
+  bool is_packed(v1::Output output) const { return compact_ & (1u << output); }
+  bool is_whole(v1::Output output) const { return asks_for(output) && !is_packed(output); }
 
-  unsigned outputs_;
-  std::size_t lanes_;
+  const unsigned outputs_;
+  const std::size_t lanes_;
+  const unsigned compact_;  // of outputs_
+  wire::Block loose_;
+  char* packed_[std::size(kPacked)] = {};
 };
 
 // Some lanes of a batch.
@@ -426,12 +484,12 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, c
   std::shared_ptr<const SharedRegions::Region> region;
   if (auto status = decoder.make_batch(tools, batch, region); !status.ok()) co_return status;
 
-  const Response response(decoder.outputs(), decoder.lanes());
+  Response response(decoder.outputs(), decoder.lanes(), decoder.compact_answer());
   if (response.bytes() > tools.limits.message_bytes)
     co_return absl::InvalidArgumentError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
                                                       " lanes are above the limit of ", tools.limits.message_bytes,
                                                       ": send fewer lanes"));
-  if (auto status = tools.stay.hold(response.bytes()); !status.ok()) co_return status;
+  if (auto status = tools.stay.hold(response.bytes() + response.loose_bytes()); !status.ok()) co_return status;
   wire::MessageWriter writer = response.make(batch);
   // As a whole: what is wrong with a piece would be told with the piece's sizes.
   if (auto status = check(decoder.operation(), batch); !status.ok()) co_return status;
@@ -444,10 +502,12 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, c
   auto computed = tools.compute.each(batch.lanes, [&](std::size_t begin, std::size_t end, Execution execution) {
     execution.stop = &tools.stop;
     const auto some = run(decoder.operation(), piece(batch, begin, end), execution);
-    if (some.ok())
+    if (some.ok()) {
       *statistics += *some;
-    else
+      response.pack(batch, begin, end);
+    } else {
       statistics = some.status();
+    }
     return some.ok();
   });
   co_await computed;

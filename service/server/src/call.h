@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A call as gRPC sees it: messages that come and go by callbacks, so that a call that waits holds no thread.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Compact and CompactStream.
 #include <algorithm>
 #include <cstdint>

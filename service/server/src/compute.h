@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The threads that compute, shared by the calls of a server.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a server tells of itself on standard error: a line an event.
 #pragma once
 

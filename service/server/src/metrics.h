@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a server counts, for Prometheus to fetch.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A server process: from start to the signal that ends it.
 #include <fcntl.h>
 #include <signal.h>

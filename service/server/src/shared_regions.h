@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory that clients on this machine share with the server: columns that lie there are not sent.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Coroutines: the course of a call is written as one function, which holds no thread while it waits.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The bearer tokens that calls must carry.
 #pragma once
 

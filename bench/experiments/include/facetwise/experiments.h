@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The experiments of the texts, each a page of the report: what is claimed, what was measured, and whether it agrees.
 #pragma once
 

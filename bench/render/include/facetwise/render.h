@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A wavefront path tracer whose scattering is the engine's batch calls: what the samplers do to a picture.
 //
 // Embree traces, TBB spreads the work, an Engine (local, remote, or the scalar baseline) samples and evaluates. The same

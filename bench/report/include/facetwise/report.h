@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The report: one page that needs no network, made of the results' JSON.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Real input: the incident directions and roughness of rays that hit a mesh, traced with Embree.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The little vector algebra that tracing needs.
 #pragma once
 

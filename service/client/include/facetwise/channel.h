@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A connection to one server, for the calls that the engine does not make: Info, Benchmark and those of tables.
 #pragma once
 

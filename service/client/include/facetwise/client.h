@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The remote engine: the library's calls, answered by one or more facetwise servers.
 #pragma once
 
@@ -36,6 +37,10 @@ struct ConnectOptions {
   // Columns that lie in this memory (shared_memory.h) are not sent: servers, which must all be unix:PATH and have been started to
   // share memory, read and write them there.
   std::shared_ptr<SharedMemory> shared_memory{};
+  // Directions and weights come in half their bytes, for networks: directions at most 8e-5 rad off, with z's sign kept, weights
+  // rounded to 2^-11 of themselves, those above 65504 to 65504 (sampler.proto). Results are not the local engine's bits then, but
+  // the same from every server.
+  bool compact_answers = false;
   // Called once a batch, on the thread that asks for it: the W3C trace context ("00-...") that its calls belong to, which
   // servers write to their logs. Empty: none.
   std::function<std::string()> traceparent{};

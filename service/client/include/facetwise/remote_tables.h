@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A server's tables of slopes. Engines from connect() upload what they need by themselves; this is for those who look after
 // a server.
 #pragma once

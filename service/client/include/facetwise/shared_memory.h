@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Memory that a program shares with facetwise servers on its own machine: columns that lie in it are read and written there by
 // the servers, and are not sent.
 #pragma once

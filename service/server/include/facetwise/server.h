@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The server: answers the library's calls over gRPC (proto/facetwise/v1/sampler.proto). docs/remote.md says
 // what its users see.
 #pragma once
