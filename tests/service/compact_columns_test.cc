@@ -145,6 +145,13 @@ TEST(CompactColumns, AnswersAreHalf) {
   EXPECT_NEAR(there[1][9], here[1][9], 8e-5);
   EXPECT_EQ(there[1][3], -7);
 
+  // What could never be held is refused at once.
+  v1::BatchRequest large = testing::good_request(1);
+  large.set_lanes(4'000'000);
+  large.clear_outputs();
+  large.add_outputs(v1::OUTGOING);
+  large.set_compact_answer(true);
+
   v1::BatchRequest request = testing::good_request(1000);
   request.clear_outputs();
   for (const v1::Output output : {v1::OUTGOING, v1::PDF, v1::WEIGHT, v1::STATUS}) request.add_outputs(output);
@@ -157,6 +164,11 @@ TEST(CompactColumns, AnswersAreHalf) {
     ASSERT_TRUE(stub->Run(&context, request, &response).ok());
     bytes[compact] = response.ByteSizeLong();
   }
+  grpc::ClientContext context;
+  v1::BatchResponse response;
+  const grpc::Status status = stub->Run(&context, large, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message().rfind("compact_answer: ", 0), 0u) << status.error_message();
   EXPECT_NEAR(static_cast<double>(bytes[0]), 21'000, 100);
   EXPECT_NEAR(static_cast<double>(bytes[1]), 11'000, 100);
 }

@@ -41,13 +41,24 @@ void Connections::add(int file) {
   accepted_.push_back({file, status.st_ino});
 }
 
+bool Connections::has_room() const {
+  const std::lock_guard lock(mutex_);
+  if (accepted_.size() >= most_) forget_closed();
+  return accepted_.size() < most_;
+}
+
 std::size_t Connections::count() const {
   const std::lock_guard lock(mutex_);
+  forget_closed();
+  return accepted_.size();
+}
+
+// Under the lock.
+void Connections::forget_closed() const {
   std::erase_if(accepted_, [](const Accepted& accepted) {
     struct stat status;
     return fstat(accepted.file, &status) != 0 || status.st_ino != accepted.inode;
   });
-  return accepted_.size();
 }
 
 Acceptor::Acceptor(std::vector<Place> places, std::unique_ptr<ToGrpc> to_unix, std::unique_ptr<ToGrpc> to_tcp,
@@ -73,7 +84,7 @@ void Acceptor::accept_all() {
     poll(sockets.data(), room ? sockets.size() : 1, room ? -1 : kLookMs);
     if (sockets[0].revents != 0) return;
     if (!room) {
-      room = connections_.count() < connections_.most();
+      room = connections_.has_room();
       continue;
     }
     for (std::size_t k = 0; k < places_.size() && room; ++k)
@@ -82,7 +93,7 @@ void Acceptor::accept_all() {
 }
 
 bool Acceptor::accept_one(const Place& place) {
-  if (connections_.count() >= connections_.most()) {
+  if (!connections_.has_room()) {
     log_.write_some(LogLevel::warning, "connections wait", {{"connections", connections_.most()}});
     return false;
   }

@@ -23,9 +23,12 @@ class Connections {
   // Of them as wanted, as far as this process may open files.
   std::size_t most() const { return most_; }
   void add(int file);
+  // Looks at them all only where it must.
+  bool has_room() const;
   std::size_t count() const;
 
  private:
+  void forget_closed() const;
   struct Accepted {
     int file;
     ino_t inode;

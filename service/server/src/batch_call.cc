@@ -489,6 +489,12 @@ Task<absl::StatusOr<grpc::ByteBuffer>> answer_batch(grpc::ByteBuffer& request, c
     co_return absl::InvalidArgumentError(absl::StrCat("outputs: ", response.bytes(), " bytes for ", decoder.lanes(),
                                                       " lanes are above the limit of ", tools.limits.message_bytes,
                                                       ": send fewer lanes"));
+  // With its request a call may hold kMessagesHeld messages.
+  if (const std::size_t made = response.bytes() + response.loose_bytes(); made > 2 * tools.limits.message_bytes)
+    co_return absl::InvalidArgumentError(
+        absl::StrCat("compact_answer: ", made, " bytes for ", decoder.lanes(),
+                     " lanes, before they are packed and after, are above the limit of ",
+                     2 * tools.limits.message_bytes, ": send fewer lanes"));
   if (auto status = tools.stay.hold(response.bytes() + response.loose_bytes()); !status.ok()) co_return status;
   wire::MessageWriter writer = response.make(batch);
   // As a whole: what is wrong with a piece would be told with the piece's sizes.

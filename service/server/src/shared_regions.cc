@@ -24,6 +24,7 @@ constexpr std::size_t kMostClients = 256;
 // A client that has connected and offers nothing for so long is let go.
 constexpr std::chrono::seconds kPatience{5};
 constexpr int kLookMs = 1000;
+constexpr std::chrono::milliseconds kPause{50};
 
 }  // namespace
 
@@ -90,7 +91,11 @@ void SharedRegions::serve() {
 
 void SharedRegions::accept(const Socket& socket) {
   Socket client(accept4(socket.file(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-  if (client.file() < 0) return;
+  if (client.file() < 0) {
+    // At the limit of open files the client stays in the system's queue, and would be found there at once.
+    std::this_thread::sleep_for(kPause);
+    return;
+  }
   clients_.push_back({std::move(client), 0, std::chrono::steady_clock::now()});
 }
 
