@@ -71,6 +71,7 @@ fw_engine* fw_local(const char* target);
 typedef struct fw_connection {
   const char *tls_ca, *tls_certificate, *tls_key, *tls_name; /* PEM files; the name in the server's certificate */
   const char* token_file;
+  int compact_answers; /* not 0: directions and weights in half their bytes, for networks (facetwise/client.h) */
 } fw_connection;
 fw_engine* fw_connect(const char* const* addresses, size_t count, const fw_connection* options);
 void fw_engine_destroy(fw_engine* engine);

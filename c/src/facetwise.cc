@@ -231,6 +231,7 @@ fw_engine* fw_connect(const char* const* addresses, size_t count, const fw_conne
       connect.tls_key = text(options->tls_key);
       connect.tls_name = text(options->tls_name);
       connect.token_file = text(options->token_file);
+      connect.compact_answers = options->compact_answers != 0;
     }
     const std::vector<std::string> all(addresses, addresses + count);
     return facetwise::connect(all, connect);

@@ -52,7 +52,8 @@ class Statistics(ctypes.Structure):
 
 
 class _Connection(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_char_p) for name in ("tls_ca", "tls_certificate", "tls_key", "tls_name", "token_file")]
+    _fields_ = [*((name, ctypes.c_char_p) for name in ("tls_ca", "tls_certificate", "tls_key", "tls_name", "token_file")),
+                ("compact_answers", ctypes.c_int)]
 
 
 _DENSITY = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.c_void_p)
@@ -349,13 +350,15 @@ def local(target: Optional[str] = None) -> Engine:
 
 
 def connect(*addresses: str, tls_ca: Optional[str] = None, tls_certificate: Optional[str] = None,
-            tls_key: Optional[str] = None, tls_name: Optional[str] = None, token_file: Optional[str] = None) -> Engine:
-    """Servers', each "unix:PATH" or "HOST:PORT": a batch's lanes are spread over those that are there, and one is enough."""
+            tls_key: Optional[str] = None, tls_name: Optional[str] = None, token_file: Optional[str] = None,
+            compact_answers: bool = False) -> Engine:
+    """Servers', each "unix:PATH" or "HOST:PORT": a batch's lanes are spread over those that are there, and one is enough.
+    compact_answers: directions (8e-5 rad off at most) and weights (2^-11) in half their bytes, for networks."""
     encoded = (ctypes.c_char_p * len(addresses))(*(address.encode() for address in addresses))
     options = _Connection(*(None if value is None else os.fsencode(value)
-                            for value in (tls_ca, tls_certificate, tls_key, tls_name, token_file)))
+                            for value in (tls_ca, tls_certificate, tls_key, tls_name, token_file)), int(compact_answers))
     recipe = ("connect", addresses, (("tls_ca", tls_ca), ("tls_certificate", tls_certificate), ("tls_key", tls_key),
-                                     ("tls_name", tls_name), ("token_file", token_file)))
+                                     ("tls_name", tls_name), ("token_file", token_file), ("compact_answers", compact_answers)))
     return Engine(_handle(_library.fw_connect(encoded, len(addresses), ctypes.byref(options))), recipe)
 
 

@@ -43,7 +43,8 @@ class Package(unittest.TestCase):
         cls.server = subprocess.Popen([SERVER, "--listen", "unix:" + socket], stdout=subprocess.PIPE, text=True)
         while "ready" not in cls.server.stdout.readline():
             assert cls.server.poll() is None
-        cls.local, cls.remote = facetwise.local(), facetwise.connect("unix:" + socket)
+        cls.address = "unix:" + socket
+        cls.local, cls.remote = facetwise.local(), facetwise.connect(cls.address)
 
     @classmethod
     def tearDownClass(cls):
@@ -155,6 +156,15 @@ class Package(unittest.TestCase):
             facetwise.local("abacus")
         with self.assertRaisesRegex(ValueError, "^weight: "):
             self.local.sample_reflection(**good, seed=1, out={"weight": np.zeros(3, np.float32)})
+
+    def test_compact_answers_are_close(self):
+        compact = facetwise.connect(self.address, compact_answers=True)
+        arguments = dict(incident=directions(1), alpha_x=alphas(2), alpha_y=0.3, seed=1)
+        whole, half = self.local.sample_reflection(**arguments), compact.sample_reflection(**arguments)
+        np.testing.assert_array_equal(half.pdf, whole.pdf)
+        np.testing.assert_allclose(half.outgoing, whole.outgoing, atol=8e-5)
+        np.testing.assert_allclose(half.weight, whole.weight, rtol=2.0 ** -11, atol=2.0 ** -25)
+        self.assertFalse(np.array_equal(half.weight, whole.weight))
 
     def test_threads_share_an_engine(self):
         i = directions(1)
