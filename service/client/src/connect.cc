@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <set>
 
@@ -43,7 +44,8 @@ class RemoteEngine final : public Engine {
       };
     if (table != nullptr)
       if (auto status = upload_to_all(*table); !status.ok()) return status;
-    if (auto status = send(connections_, options_, pieces); !status.ok()) return status;
+    if (auto status = send(connections_, options_, pieces, turn_.fetch_add(1, std::memory_order_relaxed)); !status.ok())
+      return status;
     return batch_pieces.statistics();
   }
 
@@ -58,7 +60,9 @@ class RemoteEngine final : public Engine {
       if (begin > 0) part.index = {};
       CompactPieces compact_pieces(part, limits_);
       const Pieces pieces = compact_pieces.pieces();
-      if (auto status = send(connections_, options_, pieces); !status.ok()) return status;
+      if (auto status = send(connections_, options_, pieces, turn_.fetch_add(1, std::memory_order_relaxed));
+          !status.ok())
+        return status;
       accepted = compact_pieces.accepted();
       begin += part.columns.size();
     } while (begin < compaction.columns.size());
@@ -85,6 +89,7 @@ class RemoteEngine final : public Engine {
   const std::vector<Connection> connections_;
   const ConnectOptions options_;
   const PieceLimits limits_;
+  std::atomic<std::size_t> turn_{0};
   std::mutex uploaded_mutex_;
   std::set<std::uint64_t> uploaded_;  // by SlopeTable::id()
 };

@@ -56,13 +56,15 @@ std::optional<milliseconds> rest_after(const grpc::Status& status, bool said_by_
 
 class Sender {
  public:
-  Sender(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces)
+  Sender(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces,
+         std::size_t turn)
       : connections_(connections),
         options_(options),
         pieces_(pieces),
         traceparent_(options.traceparent ? options.traceparent() : ""),
         calls_(std::min<std::size_t>(std::max(options.window, 1), pieces.count)),
-        servers_(connections.size()) {}
+        servers_(connections.size()),
+        turn_(turn % connections.size()) {}
 
   absl::Status run() {
     absl::Status error;
@@ -197,7 +199,7 @@ class Sender {
   grpc::CompletionQueue queue_;
   std::vector<Call> calls_;
   std::vector<Server> servers_;  // of each connection
-  std::size_t turn_ = 0;
+  std::size_t turn_;
   std::size_t next_ = 0;                                        // piece that has not been sent
   std::deque<std::pair<std::size_t, grpc::ByteBuffer>> again_;  // pieces that failed, and their requests
   std::size_t in_flight_ = 0;
@@ -217,8 +219,9 @@ void wait_a_moment(grpc::Channel& channel) {
     channel.WaitForStateChange(state, until);
 }
 
-absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces) {
-  return Sender(connections, options, pieces).run();
+absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces,
+                  std::size_t turn) {
+  return Sender(connections, options, pieces, turn).run();
 }
 
 }  // namespace facetwise

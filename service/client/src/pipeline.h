@@ -37,7 +37,9 @@ void wait_a_moment(grpc::Channel& channel);
 
 // Sends the pieces, at most options.window at a time, to the servers that are there, and takes the responses as they come. A
 // piece whose server is lost, busy or silent is sent again, to another or later, as long as some server answers, or did
-// within options.connect_timeout. Any other error ends it: calls in flight are cancelled and waited for.
-absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces);
+// within options.connect_timeout. Any other error ends it: calls in flight are cancelled and waited for. `turn` says which server
+// is the first to be asked where several are as free: the next one each time, so that small batches go round.
+absl::Status send(const std::vector<Connection>& connections, const ConnectOptions& options, const Pieces& pieces,
+                  std::size_t turn);
 
 }  // namespace facetwise
