@@ -55,7 +55,7 @@ class Shared : public ::testing::Test {
   std::optional<std::string> offer(const wire::RegionOffer& offer, int file) const {
     const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
-    std::strcpy(where.sun_path, wire::region_path(folder_.path("s")).c_str());
+    wire::region_path(folder_.path("s")).copy(where.sun_path, sizeof where.sun_path - 1);
     EXPECT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&where), sizeof where), 0);
     EXPECT_TRUE(wire::send_offer(socket, offer, file).ok());
     wire::RegionAnswer answer;
@@ -296,7 +296,7 @@ TEST_F(Shared, OfClientsThatDieNothingStays) {
     // Without gRPC, which does not survive a fork: the offer alone.
     const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
     sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
-    std::strcpy(where.sun_path, wire::region_path(folder_.path("s")).c_str());
+    wire::region_path(folder_.path("s")).copy(where.sun_path, sizeof where.sun_path - 1);
     char byte = ::connect(socket, reinterpret_cast<const sockaddr*>(&where), sizeof where) == 0 &&
                         wire::send_offer(socket, {.id = 7, .bytes = memory_->bytes()}, memory_->file()).ok() &&
                         recv(socket, &byte, 1, 0) == 1
