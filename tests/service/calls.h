@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "facetwise/engine.h"
 #include "facetwise/v1/sampler.grpc.pb.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
@@ -44,6 +45,19 @@ inline v1::BatchRequest good_request(std::size_t lanes) {
   for (const v1::Output output : {v1::OUTGOING, v1::NORMAL, v1::INCIDENT_DOT_NORMAL, v1::PDF, v1::WEIGHT, v1::STATUS})
     request.add_outputs(output);
   return request;
+}
+
+// One lane by sample_reflection: its weight, in (0.5, 1], or why not.
+inline absl::StatusOr<float> sample_one(Engine& engine) {
+  float weight = 0;
+  Batch batch;
+  batch.lanes = 1;
+  batch.incident = {0.6f, 0.0f, 0.8f};
+  batch.alpha_x = batch.alpha_y = 0.5f;
+  batch.u1 = batch.u2 = batch.u3 = 0.25f;
+  batch.out.weight = {&weight, 1};
+  if (const auto status = engine.sample_reflection(batch).status(); !status.ok()) return status;
+  return weight;
 }
 
 // Calls that have begun and send nothing.

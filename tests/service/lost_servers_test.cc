@@ -103,16 +103,7 @@ TEST_F(LostServers, NoneAreLeftOutWhileAllAreThere) {
   const auto first = server(0), second = server(1), third = server(2);
   ConnectOptions options;
   const auto engine = connected(3, options);
-  for (int n = 0; n < 9; ++n) {
-    float weight = 0;
-    Batch batch;
-    batch.lanes = 1;
-    batch.incident = {0.6f, 0.0f, 0.8f};
-    batch.alpha_x = batch.alpha_y = 0.5f;
-    batch.generator = {.seed = 1};
-    batch.out.weight = {&weight, 1};
-    ASSERT_TRUE(engine->sample_reflection(batch).ok());
-  }
+  for (int n = 0; n < 9; ++n) ASSERT_TRUE(testing::sample_one(*engine).ok());
   for (int n = 0; n < 3; ++n) {
     grpc::ClientContext context;
     v1::InfoResponse info;

@@ -22,6 +22,7 @@ namespace {
 using grpc::StatusCode;
 using testing::good_request;
 using testing::open_channel;
+using testing::sample_one;
 using testing::ServerProcess;
 using Json = nlohmann::json;
 
@@ -75,17 +76,6 @@ class Operation : public ::testing::Test {
 
   testing::TemporaryFolder folder_;
 };
-
-absl::Status sample_one(Engine& engine) {
-  float value = 0;
-  Batch batch;
-  batch.lanes = 1;
-  batch.incident = {0.6f, 0.0f, 0.8f};
-  batch.alpha_x = batch.alpha_y = 0.5f;
-  batch.u1 = batch.u2 = batch.u3 = 0.25f;
-  batch.out.weight = {&value, 1};
-  return engine.sample_reflection(batch).status();
-}
 
 v1::BatchRequest bad_request() {
   v1::BatchRequest request = good_request(10);
@@ -217,8 +207,9 @@ TEST_F(Operation, LogsTellOfEachCallWithItsId) {
 }
 
 TEST_F(Operation, ClientsErrorsNameTheRequest) {
-  ServerProcess server({"--listen", unix_address(), "--log", "--max-open-calls", "1", "--patience-ms", "60000"});
-  ASSERT_TRUE(server.ready());
+  ServerProcess server({"--listen", unix_address(), "--log", "--max-open-calls", "1", "--patience-ms", "60000",
+                        "--metrics", "127.0.0.1:0"});
+  ASSERT_EQ(server.addresses().size(), 2u);
   ConnectOptions options;
   options.connect_timeout = std::chrono::milliseconds(500);
   const std::string address = unix_address();
@@ -227,7 +218,9 @@ TEST_F(Operation, ClientsErrorsNameTheRequest) {
   {
     testing::SilentCalls only(open_channel(address));
     only.begin("/facetwise.v1.Sampler/Run");
-    const absl::Status status = sample_one(**engine);
+    // It has begun here; now also there.
+    for (int n = 0; n < 500 && metrics_of(server.addresses()[1])["facetwise_calls_open"] != 1; ++n) usleep(10000);
+    const absl::Status status = sample_one(**engine).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
     const std::string text(status.message());
     const auto at = text.find(" (request ");
