@@ -2,9 +2,7 @@
 #include "app/echo_server.h"
 
 #include <cstdlib>
-#include <utility>
 
-#include "app/errors.h"
 #include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
 #include "grpcpp/security/server_credentials.h"

@@ -52,7 +52,7 @@ std::string manual_page(const CLI::App& app) {
       ".SH SYNOPSIS\n\\fBfacetwise\\fR \\fIVERB\\fR [\\fIOPTION\\fR ...]\n.SH DESCRIPTION\n{}",
       version(), paragraphs(app.get_description()));
   for (const CLI::App* verb : app.get_subcommands({}))
-    out += fmt::format(".SH {}\n{}.PP\n{}{}.PP\n{}", escaped(verb->get_name()), paragraphs(verb->get_description()), "",
+    out += fmt::format(".SH {}\n{}.PP\n{}.PP\n{}", escaped(verb->get_name()), paragraphs(verb->get_description()),
                        options(*verb), paragraphs(verb->get_footer()));
   return out + ".SH EXAMPLES AND EXIT CODES\n" + paragraphs(app.get_footer());
 }

@@ -2,12 +2,12 @@
 #include "app/transport.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
 
-#include "app/errors.h"
 #include "facetwise/channel.h"
 #include "facetwise/column_memory.h"
 #include "facetwise/engine.h"
@@ -33,6 +33,13 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
+// Of a lane at t in (0, 1): i, roughness, u1, u2.
+std::array<float, 7> inputs_at(std::size_t lane, std::size_t lanes) {
+  const float t = (static_cast<float>(lane) + 0.5f) / static_cast<float>(lanes);
+  return {std::sqrt(1 - t * t),   0, t, 0.1f + 0.8f * t, 0.9f - 0.8f * t, std::fmod(97 * t, 1.0f),
+          std::fmod(31 * t, 1.0f)};
+}
+
 // sample_reflection by `bounded`: every input a column, direction, pdf, weight and status back.
 grpc::ByteBuffer request_of(std::size_t lanes) {
   v1::BatchRequest request;
@@ -41,18 +48,17 @@ grpc::ByteBuffer request_of(std::size_t lanes) {
   request.set_lanes(lanes);
   for (const v1::Output output : {v1::OUTGOING, v1::PDF, v1::WEIGHT, v1::STATUS}) request.add_outputs(output);
   std::vector<float> column(lanes);
-  const auto filled = [&](auto value) {
-    for (std::size_t lane = 0; lane < lanes; ++lane)
-      column[lane] = value((static_cast<float>(lane) + 0.5f) / static_cast<float>(lanes));
+  const auto filled = [&](std::size_t k) {
+    for (std::size_t lane = 0; lane < lanes; ++lane) column[lane] = inputs_at(lane, lanes)[k];
     return std::string(reinterpret_cast<const char*>(column.data()), 4 * lanes);
   };
-  request.mutable_incident()->set_x(filled([](float t) { return std::sqrt(1 - t * t); }));
-  request.mutable_incident()->set_y(filled([](float) { return 0.0f; }));
-  request.mutable_incident()->set_z(filled([](float t) { return t; }));
-  request.set_alpha_x(filled([](float t) { return 0.1f + 0.8f * t; }));
-  request.set_alpha_y(filled([](float t) { return 0.9f - 0.8f * t; }));
-  request.set_u1(filled([](float t) { return std::fmod(97 * t, 1.0f); }));
-  request.set_u2(filled([](float t) { return std::fmod(31 * t, 1.0f); }));
+  request.mutable_incident()->set_x(filled(0));
+  request.mutable_incident()->set_y(filled(1));
+  request.mutable_incident()->set_z(filled(2));
+  request.set_alpha_x(filled(3));
+  request.set_alpha_y(filled(4));
+  request.set_u1(filled(5));
+  request.set_u2(filled(6));
   const grpc::Slice slice(request.SerializeAsString());
   return grpc::ByteBuffer(&slice, 1);
 }
@@ -162,7 +168,6 @@ class Caller {
         --open;
     }
     const double rate = static_cast<double>(answers) / seconds_since(begin);
-    grpc::Status status;
     for (Call& call : calls) {
       call.context->TryCancel();
       call.stream->Finish(&call.status, &call);
@@ -256,9 +261,7 @@ class Measurement {
     const std::size_t lanes = columns.lanes();
     const auto column = [&](std::size_t k) { return std::span(columns[k], lanes); };
     for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const float t = (static_cast<float>(lane) + 0.5f) / static_cast<float>(lanes);
-      const float values[] = {std::sqrt(1 - t * t),   0, t, 0.1f + 0.8f * t, 0.9f - 0.8f * t, std::fmod(97 * t, 1.0f),
-                              std::fmod(31 * t, 1.0f)};
+      const std::array<float, 7> values = inputs_at(lane, lanes);
       for (std::size_t k = 0; k < std::size(values); ++k) columns[k][lane] = values[k];
     }
     Batch batch;

@@ -2,7 +2,6 @@
 // What a server tells of itself on standard error: a line an event.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <memory>
 #include <mutex>
