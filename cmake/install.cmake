@@ -30,8 +30,12 @@ endfunction()
 
 install_libraries(engine TARGETS facetwise facetwise_reference INCLUDES ${PROJECT_SOURCE_DIR}/engine/include)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/facetwise-config-version.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_SOURCE_DIR}/cmake/facetwise-config.cmake ${PROJECT_BINARY_DIR}/facetwise-config-version.cmake
+configure_file(${PROJECT_SOURCE_DIR}/cmake/facetwise-config.cmake.in ${PROJECT_BINARY_DIR}/facetwise-config.cmake @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/facetwise-config.cmake ${PROJECT_BINARY_DIR}/facetwise-config-version.cmake
   DESTINATION ${package_folder} COMPONENT engine)
+if(FACETWISE_TBB)
+  set(tbb_package " tbb")
+endif()
 install_pkg_config(facetwise-engine engine)
 if(FACETWISE_ENGINE_ONLY)
   return()

@@ -60,12 +60,13 @@ absl::StatusOr<std::size_t> compact(const Compaction& c, const Execution& execut
   std::array<std::size_t, kChunks + 1> first{};
   const Threading threading(positions, 262144, execution);  // a nanosecond a lane or less
   const auto for_each_chunk = [&](const auto& body) {
-    const auto one = [&](std::size_t k) { body(k, k * chunk, std::min(positions, (k + 1) * chunk)); };
-    if (!threading.spreads() || chunks < 2) {
-      for (std::size_t k = 0; k < chunks; ++k) one(k);
-    } else {
-      tbb::parallel_for(std::size_t{0}, chunks, one);
-    }
+    const auto some = [&](std::size_t first_chunk, std::size_t last) {
+      for (std::size_t k = first_chunk; k < last; ++k) body(k, k * chunk, std::min(positions, (k + 1) * chunk));
+    };
+    if (!threading.spreads() || chunks < 2)
+      some(0, chunks);
+    else
+      for_each_part(chunks, some);
   };
   for_each_chunk([&](std::size_t k, std::size_t begin, std::size_t end) {
     std::size_t count = 0;

@@ -7,8 +7,7 @@
 #include <cstddef>
 
 #include "facetwise/target.h"
-#include "tbb/blocked_range.h"
-#include "tbb/parallel_for.h"
+#include "src/tasks.h"
 
 namespace facetwise {
 
@@ -48,9 +47,9 @@ template <class Body>
 void for_each_range(std::size_t positions, std::size_t head, const Body& body) {
   constexpr std::size_t kUnit = 2048;  // small, so that a thread that wakes up late still finds work
   const std::size_t units = (positions - head + kUnit - 1) / kUnit;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, units), [&](const auto& range) {
-    const std::size_t end = head + range.end() * kUnit;
-    body(range.begin() == 0 ? 0 : head + range.begin() * kUnit, end < positions ? end : positions);
+  for_each_part(units, [&](std::size_t first, std::size_t last) {
+    const std::size_t end = head + last * kUnit;
+    body(first == 0 ? 0 : head + first * kUnit, end < positions ? end : positions);
   });
 }
 

@@ -8,7 +8,7 @@
 #include <mutex>
 
 #include "src/float_environment.h"
-#include "tbb/parallel_for.h"
+#include "src/tasks.h"
 
 namespace facetwise {
 
@@ -19,19 +19,25 @@ class Work {
 
   template <class Body>
   void each(std::size_t n, double cost, const Body& body) {
-    tbb::parallel_for(std::size_t{0}, n, [&](std::size_t k) {
+    for_each_part(n, [&](std::size_t begin, std::size_t end) {
       const FloatEnvironment environment;
-      body(k);
-      if (!progress_) return;
-      const std::lock_guard lock(mutex_);
-      done_ += cost;
-      if (done_ < told_ + total_ / 100) return;
-      told_ = done_;
-      progress_(std::min(done_ / total_, 1.0));
+      for (std::size_t k = begin; k < end; ++k) {
+        body(k);
+        tell(cost);
+      }
     });
   }
 
  private:
+  void tell(double cost) {
+    if (!progress_) return;
+    const std::lock_guard lock(mutex_);
+    done_ += cost;
+    if (done_ < told_ + total_ / 100) return;
+    told_ = done_;
+    progress_(std::min(done_ / total_, 1.0));
+  }
+
   const std::function<void(double)>& progress_;
   std::mutex mutex_;
   double total_, done_ = 0, told_ = 0;

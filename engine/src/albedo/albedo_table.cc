@@ -11,8 +11,8 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/slope_table.h"
 #include "src/albedo/layout.h"
+#include "src/tasks.h"
 #include "src/table/sealed.h"
-#include "tbb/task_arena.h"
 
 namespace facetwise {
 namespace {
@@ -159,7 +159,7 @@ absl::StatusOr<std::shared_ptr<const AlbedoTable>> albedo_table(const Model& mod
   if (kept->table != nullptr) return kept->table;
   absl::StatusOr<std::shared_ptr<const AlbedoTable>> built;
   // Isolated: a task of the caller's that this thread took up meanwhile might ask for the same table.
-  tbb::this_task_arena::isolate([&] { built = AlbedoTable::build(model, {.progress = progress}); });
+  isolated([&] { built = AlbedoTable::build(model, {.progress = progress}); });
   if (built.ok()) kept->table = *built;
   return built;
 }

@@ -10,10 +10,9 @@
 #include "absl/strings/str_cat.h"
 #include "facetwise/slope_table.h"
 #include "src/float_environment.h"
+#include "src/tasks.h"
 #include "src/table/layout.h"
 #include "src/work.h"
-#include "tbb/parallel_for.h"
-#include "tbb/task_arena.h"
 
 namespace facetwise {
 namespace {
@@ -317,7 +316,7 @@ absl::StatusOr<std::shared_ptr<const SlopeTable>> SlopeTable::build(const SlopeD
   if (options.threads == 0)
     run();
   else
-    tbb::task_arena(static_cast<int>(std::min<std::size_t>(options.threads, 1024))).execute(run);
+    with_threads(options.threads, run);
   if (!status.ok()) return status;
   if (options.progress) options.progress(1);
   return SlopeTableMaker::make(sizes, std::move(values));
