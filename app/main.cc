@@ -39,10 +39,10 @@ int main(int argc, char** argv) {
   app.footer(kExamples);
   app.require_subcommand(1);
   app.get_formatter()->column_width(34);
-  const std::vector<Verb> verbs = {add_sample(app), add_pdf(app),    add_evaluate(app),   add_albedo(app),
-                                   add_serve(app),  add_verify(app), add_bench(app),      add_summary(app),
-                                   add_table(app),  add_render(app), add_experiment(app), add_report(app),
-                                   add_info(app),   add_load(app),   add_transport(app)};
+  const std::vector<Verb> verbs = {add_sample(app),  add_pdf(app),    add_evaluate(app), add_albedo(app),
+                                   add_serve(app),   add_verify(app), add_prove(app),    add_bench(app),
+                                   add_summary(app), add_table(app),  add_render(app),   add_experiment(app),
+                                   add_report(app),  add_info(app),   add_load(app),     add_transport(app)};
   // For the installation; no verbs of their own.
   if (argc == 3 && std::string(argv[1]) == "--write") {
     const std::string what = argv[2];

@@ -21,6 +21,7 @@ Verb add_evaluate(CLI::App& app);
 Verb add_albedo(CLI::App& app);
 Verb add_verify(CLI::App& app);
 Verb add_serve(CLI::App& app);
+Verb add_prove(CLI::App& app);
 Verb add_bench(CLI::App& app);
 Verb add_info(CLI::App& app);
 Verb add_load(CLI::App& app);

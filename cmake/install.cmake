@@ -52,7 +52,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/proto/facetwise/v1/sampler.proto
 install_libraries(server TARGETS facetwise_server INCLUDES ${PROJECT_SOURCE_DIR}/service/server/include)
 
 install(TARGETS facetwise_c LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT c NAMELINK_COMPONENT c-dev)
-install(FILES ${PROJECT_SOURCE_DIR}/c/include/facetwise.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT c-dev)
+install(FILES ${PROJECT_SOURCE_DIR}/c/include/facetwise.h ${PROJECT_SOURCE_DIR}/c/include/facetwise_plugin.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT c-dev)
 install_pkg_config(facetwise c-dev)
 
 install(TARGETS facetwise_app RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)

@@ -15,7 +15,7 @@ TEST(Help, EveryVerbExplainsItselfWithAnExample) {
   const auto all = facetwise({"--help"});
   ASSERT_EQ(all.code, 0);
   for (const std::string verb :
-       {"sample", "pdf", "evaluate", "serve", "verify", "bench", "summary", "info", "load", "transport"}) {
+       {"sample", "pdf", "evaluate", "serve", "verify", "prove", "bench", "summary", "info", "load", "transport"}) {
     EXPECT_NE(all.out.find("\n  " + verb + " "), std::string::npos) << verb;
     const auto help = facetwise({verb, "--help"});
     EXPECT_EQ(help.code, 0);

@@ -142,7 +142,7 @@ void expect_the_references(const Model& model) {
 void expect_the_mean_weight(const Model& model) {
   std::vector<float> weight(1 << (long_run() ? 16 : 15));
   for (const bool isotropic : {true, false}) {
-    const Places at = places(model, long_run() ? 400 : 150, isotropic, isotropic ? 3 : 4, 1e-6, kSmallestAlpha);
+    const Places at = places(model, long_run() ? 400 : 80, isotropic, isotropic ? 3 : 4, 1e-6, kSmallestAlpha);
     const std::vector<float> got = albedos(model, at);
     for (std::size_t n = 0; n < at.size(); ++n) {
       const Mean mean = mean_weight(model, at, n, weight);
@@ -186,7 +186,7 @@ void expect_a_white_furnace(Model model) {
   std::vector<float> weight(1 << (long_run() ? 17 : 16));
   for (const Compensation compensation : {Compensation::turquin, Compensation::kelemen}) {
     model.compensation = compensation;
-    const Places at = places(model, long_run() ? 60 : 30, true, 90, 1e-6, kSmallestAlpha, 4);
+    const Places at = places(model, long_run() ? 60 : 16, true, 90, 1e-6, kSmallestAlpha, 4);
     for (std::size_t n = 0; n < at.size(); ++n) {
       const Mean mean = mean_weight(model, at, n, weight);
       EXPECT_NEAR(mean.value, 1, (at.alpha_x[n] <= 1 ? 0.005 : 0.02) + 5 * mean.deviation)

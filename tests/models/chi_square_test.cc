@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Samples follow their densities: chi-square over cells of standard slopes, for every sampler of every
 // family.
-#include "support/chi_square.h"
+#include "facetwise/chi_square.h"
 
 #include <gtest/gtest.h>
 

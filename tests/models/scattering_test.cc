@@ -7,7 +7,7 @@
 #include <cstdio>
 
 #include "models/compositions.h"
-#include "support/chi_square.h"
+#include "facetwise/chi_square.h"
 #include "support/counts.h"
 
 namespace facetwise::test {

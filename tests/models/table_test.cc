@@ -9,7 +9,7 @@
 
 #include "facetwise/slope_table.h"
 #include "models/compositions.h"
-#include "support/chi_square.h"
+#include "facetwise/chi_square.h"
 #include "support/counts.h"
 
 namespace facetwise::test {

@@ -102,5 +102,23 @@ TEST(ModelExact, IsWhereItIsSaidToBe) {
   }
 }
 
+// Directions that are each other's opposite but for rounding, at grazing incidence: no slope of the ellipse has their half
+// vector. (Their pdf was the largest float once.)
+TEST(ModelExact, HasNoDensityWhereNoSlopeIs) {
+  float pdf = -1;
+  Batch batch;
+  batch.model.distribution = Distribution::beckmann;
+  batch.model.retro = true;
+  batch.sampler = Sampler::exact;
+  batch.lanes = 1;
+  batch.incident = {-0.806684375f, -0.590982437f, 1.27004239e-06f};
+  batch.outgoing = {-0.806684434f, -0.590982437f, 1.27004239e-06f};
+  batch.alpha_x = 1.40472591f;
+  batch.alpha_y = 0.01f;
+  batch.out.pdf = {&pdf, 1};
+  ASSERT_TRUE(pdf_reflection(batch).ok());
+  EXPECT_LE(pdf, 1e-24f);
+}
+
 }  // namespace
 }  // namespace facetwise::test

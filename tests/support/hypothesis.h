@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "support/chi_square.h"
+#include "facetwise/chi_square.h"
 #include "support/draw.h"
 #include "support/lobe.h"
 

@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "support/chi_square.h"
+#include "facetwise/chi_square.h"
 
 namespace facetwise::test {
 

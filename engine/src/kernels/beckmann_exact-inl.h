@@ -140,7 +140,9 @@ struct BeckmannExact : SamplerTraits {
     ellipse.Chord(d, x, from, to);
     const NormalInterval<D> interval(d, from, to);
     shift = i.all_front ? interval.shift : Select(i.front, interval.shift, i.shift);
-    const V two_n = (ellipse.area + ellipse.area) * interval.share;
+    // Rounding may make a half vector of directions that are each other's opposite which no such slope has: no density.
+    const auto outside = Or(x < ellipse.xa, x > ellipse.xb);
+    const V two_n = Select(outside, Set(d, kLargestDensity), (ellipse.area + ellipse.area) * interval.share);
     return i.all_front ? two_n : Select(i.front, two_n, i.two_normaliser);
   }
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-namespace facetwise::test {
+namespace facetwise {
 
 // Q(a, x) = Gamma(a, x) / Gamma(a), a > 0, x >= 0; relative error below 1e-10.
 double upper_incomplete_gamma(double a, double x);
@@ -24,4 +24,4 @@ ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const doub
 // probability `any`.
 double sidak(double any, int tests);
 
-}  // namespace facetwise::test
+}  // namespace facetwise

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/chi_square.h"
+#include "facetwise/chi_square.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-namespace facetwise::test {
+namespace facetwise {
 namespace {
 
 // x^a exp(-x) / Gamma(a)
@@ -77,4 +77,4 @@ ChiSquare chi_square(std::span<const std::uint64_t> counts, std::span<const doub
 
 double sidak(double any, int tests) { return -std::expm1(std::log1p(-any) / tests); }
 
-}  // namespace facetwise::test
+}  // namespace facetwise
