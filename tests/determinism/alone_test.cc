@@ -55,7 +55,7 @@ TEST(Alone, Tables) {
                                          .progress = [&](double done) { told = done; }});
   ASSERT_TRUE(slopes.ok()) << slopes.status();
   EXPECT_EQ(told, 1);
-  const auto albedo = AlbedoTable::build({}, {.samples = 16});
+  const auto albedo = AlbedoTable::build({}, {.sizes = {17, 9, 5, 5, 3, 3}, .samples = 4});
   ASSERT_TRUE(albedo.ok()) << albedo.status();
   EXPECT_EQ(threads_of_this_process(), kAtStart);
 }
