@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // facetwise.hlsl: GGX reflection sampling that wastes no sample, to paste into a shader. Shader model 5.0 and later. The same
-// as facetwise.hpp beside it, which says more.
+// as facetwise.hpp beside it, which says more. Made of facetwise.glsl by tests/ports/hlsl_from_glsl.py.
 //
 //   fw_sample_exact    reflections by the visible normals whose reflection is not occluded, in exact proportion: every sample
 //                      leaves the surface. pdf = D(m) / (4 K), K the projected area of those normals. The facetwise project,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// GGX with Smith masking as renderers write it, one lane at a time.
+// GGX with Smith masking as renderers write it, one lane at a time: all but how a normal is drawn.
 #pragma once
 
 #include <algorithm>
@@ -34,4 +34,25 @@ inline float value(Vec i, Vec o, float ax, float ay) {
   const Vec m = normalised({i.x + o.x, i.y + o.y, i.z + o.z});
   const float g2 = 1 / (1 + lambda(i, ax, ay) + lambda(o, ax, ay));
   return distribution(m, ax, ay) * g2 / (4 * i.z);
+}
+
+// To be defined: a microfacet normal for i, i_z > 0, and the density of the reflections by such normals.
+Vec normal(Vec i, float ax, float ay, float u1, float u2);
+float pdf(Vec i, Vec m, float ax, float ay);
+
+Drawn sample(Vec i, float ax, float ay, float u1, float u2, float) {
+  Drawn d;
+  if (!(i.z > 0)) return d;
+  const Vec m = normal(i, ax, ay, u1, u2);
+  if (!(dot(i, m) > 0)) return d;
+  d.o = reflected(i, m);
+  if (!(d.o.z > 0)) return {};
+  d.pdf = pdf(i, m, ax, ay);
+  d.weight = value(i, d.o, ax, ay) / d.pdf;
+  return d;
+}
+
+Asked evaluate(Vec i, Vec o, float ax, float ay) {
+  if (!(i.z > 0 && o.z > 0)) return {};
+  return {pdf(i, normalised({i.x + o.x, i.y + o.y, i.z + o.z}), ax, ay), value(i, o, ax, ay)};
 }

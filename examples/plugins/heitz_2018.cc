@@ -3,21 +3,15 @@
 #include "ggx.h"
 
 #ifdef WITHOUT_G1
-const char* const kName = "ggx by visible normals, its pdf without G1";
-#else
-const char* const kName = "ggx by visible normals (Heitz 2018)";
-#endif
-
-namespace {
-
-#ifdef WITHOUT_G1
 // A mistake that is easily made: the density of visible normals without the share of them that is seen.
+const char* const kName = "ggx by visible normals, its pdf without G1";
 float pdf(Vec i, Vec m, float ax, float ay) { return distribution(m, ax, ay) / (4 * i.z); }
 #else
+const char* const kName = "ggx by visible normals (Heitz 2018)";
 float pdf(Vec i, Vec m, float ax, float ay) { return g1(i, ax, ay) * distribution(m, ax, ay) / (4 * i.z); }
 #endif
 
-Vec visible_normal(Vec i, float ax, float ay, float u1, float u2) {
+Vec normal(Vec i, float ax, float ay, float u1, float u2) {
   const Vec h = normalised({ax * i.x, ay * i.y, i.z});
   const float across2 = h.x * h.x + h.y * h.y, inverse = across2 > 0 ? 1 / std::sqrt(across2) : 0;
   const Vec t1 = across2 > 0 ? Vec{-h.y * inverse, h.x * inverse, 0} : Vec{1, 0, 0};
@@ -27,22 +21,4 @@ Vec visible_normal(Vec i, float ax, float ay, float u1, float u2) {
   const float c = std::sqrt(std::max(1 - a * a - b * b, 0.0f));
   return normalised({ax * (a * t1.x + b * t2.x + c * h.x), ay * (a * t1.y + b * t2.y + c * h.y),
                      std::max(a * t1.z + b * t2.z + c * h.z, 1e-7f)});
-}
-
-}  // namespace
-
-Drawn sample(Vec i, float ax, float ay, float u1, float u2, float) {
-  Drawn d;
-  if (!(i.z > 0)) return d;
-  const Vec m = visible_normal(i, ax, ay, u1, u2);
-  d.o = reflected(i, m);
-  if (!(d.o.z > 0)) return {};
-  d.pdf = pdf(i, m, ax, ay);
-  d.weight = value(i, d.o, ax, ay) / d.pdf;
-  return d;
-}
-
-Asked evaluate(Vec i, Vec o, float ax, float ay) {
-  if (!(i.z > 0 && o.z > 0)) return {};
-  return {pdf(i, normalised({i.x + o.x, i.y + o.y, i.z + o.z}), ax, ay), value(i, o, ax, ay)};
 }

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "facetwise/chi_square.h"
+#include "facetwise/gauss.h"
 #include "facetwise/prove.h"
 
 namespace facetwise::prove {
@@ -62,28 +63,6 @@ class Agreement {
   double worst_ = 0, a_ = 0, b_ = 0;
 };
 
-// Gauss-Legendre on [0, 1].
-struct Rule {
-  std::vector<double> at, weight;
-};
-Rule gauss(int n) {
-  Rule rule;
-  for (int k = 0; k < n; ++k) {
-    double x = std::cos(pi * (k + 0.75) / (n + 0.5)), slope = 0;
-    for (int step = 0; step < 50; ++step) {
-      double p0 = 1, p1 = x;
-      for (int j = 2; j <= n; ++j) p0 = std::exchange(p1, ((2 * j - 1) * x * p1 - (j - 1) * p0) / j);
-      slope = n * (x * p1 - p0) / (x * x - 1);
-      const double change = p1 / slope;
-      x -= change;
-      if (std::abs(change) < 1e-15) break;
-    }
-    rule.at.push_back((1 + x) / 2);
-    rule.weight.push_back(1 / ((1 - x * x) * slope * slope));
-  }
-  return rule;
-}
-
 struct Integrals {
   std::vector<double> pdf = std::vector<double>(kCells), value = pdf;
 };
@@ -115,7 +94,7 @@ class Examination {
   }
 
   absl::StatusOr<Integrals> integrals(int points) const {
-    const Rule rule = gauss(points);
+    const GaussRule rule = gauss_rule(points);
     const double dt = pi / kThetas, dp = 2 * pi / kPhis;
     const auto n = static_cast<std::size_t>(points);
     Lanes lanes(kCells * n * n);
@@ -125,10 +104,10 @@ class Examination {
     for (int row = 0; row < kThetas; ++row)
       for (int column = 0; column < kPhis; ++column)
         for (std::size_t a = 0; a < n; ++a) {
-          const double theta = (row + rule.at[a]) * dt;
+          const double theta = (row + rule.point[a]) * dt;
           weights[static_cast<std::size_t>(row) * n + a] = std::sin(theta) * rule.weight[a] * dt * dp;
           for (std::size_t b = 0; b < n; ++b, ++lane) {
-            const double phi = (column + rule.at[b]) * dp;
+            const double phi = (column + rule.point[b]) * dp;
             lanes.ox[lane] = static_cast<float>(std::sin(theta) * std::cos(phi));
             lanes.oy[lane] = static_cast<float>(std::sin(theta) * std::sin(phi));
             lanes.oz[lane] = static_cast<float>(std::cos(theta));

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "facetwise/gauss.h"
 #include "facetwise/reference.h"
 
 namespace facetwise::test::slopes {
@@ -24,33 +24,16 @@ inline Vector direction(double theta_degrees, double phi_degrees) {
   return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
-// Gauss-Legendre points and weights on [0, 1].
-struct Rule {
-  std::vector<double> point, weight;
-};
-inline const Rule& rule(int count) {
-  static std::vector<Rule> rules(65);
-  Rule& r = rules[count];
-  if (!r.point.empty()) return r;
-  for (int n = 0; n < count; ++n) {
-    double x = std::cos(std::numbers::pi * (n + 0.75) / (count + 0.5)), slope = 0;
-    for (int step = 0; step < 100; ++step) {
-      double last = 1, p = x;
-      for (int k = 2; k <= count; ++k) last = std::exchange(p, ((2 * k - 1) * x * p - (k - 1) * last) / k);
-      slope = count * (x * p - last) / (x * x - 1);
-      const double change = p / slope;
-      x -= change;
-      if (std::abs(change) < 1e-16) break;
-    }
-    r.point.push_back((1 + x) / 2);
-    r.weight.push_back(1 / ((1 - x * x) * slope * slope));
-  }
+inline const GaussRule& rule(int count) {
+  static std::vector<GaussRule> rules(65);
+  GaussRule& r = rules[count];
+  if (r.point.empty()) r = gauss_rule(count);
   return r;
 }
 
 template <class F>
 double panel(const F& f, double a, double b, int count) {
-  const Rule& r = rule(count);
+  const GaussRule& r = rule(count);
   double sum = 0;
   for (int n = 0; n < count; ++n) sum += r.weight[n] * f(a + (b - a) * r.point[n]);
   return sum * (b - a);

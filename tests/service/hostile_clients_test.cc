@@ -6,7 +6,6 @@
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <array>
@@ -19,6 +18,7 @@
 #include "gtest/gtest.h"
 #include "health.h"
 #include "server_process.h"
+#include "wire/unix_socket.h"
 
 namespace facetwise {
 namespace {
@@ -39,21 +39,11 @@ constexpr const char* kMemory = "VmRSS";
 // Threads that gRPC may have begun meanwhile for itself.
 constexpr long kOthers = 8;
 
-int connect_to(const std::string& path) {
-  sockaddr_un address = {.sun_family = AF_UNIX, .sun_path = {}};
-  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
-  const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return socket;
-  close(socket);
-  return -1;
-}
-
 // One connection to a server, of which only so many bytes get through.
 class Strait {
  public:
   Strait(const std::string& path, const std::string& server, std::size_t bytes) : left_(bytes) {
-    sockaddr_un address = {.sun_family = AF_UNIX, .sun_path = {}};
-    std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+    const sockaddr_un address = wire::unix_address(path);
     listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || listen(listener_, 1) != 0)
       std::abort();
@@ -72,7 +62,7 @@ class Strait {
     }
     if (ends_) return;
     const int here = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
-    const int there = connect_to(server);
+    const int there = wire::connect_unix(server);
     while (!ends_) {
       pollfd ends[] = {{there, POLLIN, 0}, {here, static_cast<short>(left_ > 0 ? POLLIN : 0), 0}};
       poll(ends, 2, 20);
@@ -278,7 +268,7 @@ TEST_F(HostileClients, ThatAreIdleCostNoThread) {
   const long threads = server.status("Threads"), memory = server.status(kMemory);
   std::vector<int> connections;
   for (int k = 0; k < 1000; ++k) {
-    connections.push_back(connect_to(path()));
+    connections.push_back(wire::connect_unix(path()));
     ASSERT_GE(connections.back(), 0) << k;
   }
   const auto channel = open_channel(address());
@@ -312,7 +302,7 @@ TEST_F(HostileClients, ThatConnectTooOftenWait) {
     EXPECT_TRUE(run(3).ok());
     std::vector<int> connections;
     for (int k = 0; k < 100; ++k) {
-      connections.push_back(connect_to(path()));
+      connections.push_back(wire::connect_unix(path()));
       ASSERT_GE(connections.back(), 0);
     }
     EXPECT_EQ(run(3, std::chrono::seconds(1)).error_code(), StatusCode::DEADLINE_EXCEEDED);

@@ -3,7 +3,6 @@
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -17,6 +16,7 @@
 #include "gtest/gtest.h"
 #include "health.h"
 #include "server_process.h"
+#include "wire/unix_socket.h"
 
 namespace facetwise {
 namespace {
@@ -294,10 +294,8 @@ TEST_F(Lifetime, OutlivesClientsThatGoAway) {
   // Connections that send something else, or nothing, and close.
   for (const char* text :
        {"", "GET / HTTP/1.1\r\n\r\n", "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\xff\xff\xff\xff\xff\xff\xff\xff\xff"}) {
-    const int connection = socket(AF_UNIX, SOCK_STREAM, 0);
-    sockaddr_un address = {.sun_family = AF_UNIX, .sun_path = {}};
-    std::strncpy(address.sun_path, folder_.path("s").c_str(), sizeof address.sun_path - 1);
-    ASSERT_EQ(connect(connection, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    const int connection = wire::connect_unix(folder_.path("s"));
+    ASSERT_GE(connection, 0);
     EXPECT_EQ(send(connection, text, std::strlen(text), MSG_NOSIGNAL), static_cast<ssize_t>(std::strlen(text)));
     close(connection);
   }

@@ -8,7 +8,6 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,6 +20,7 @@
 #include "gtest/gtest.h"
 #include "server_process.h"
 #include "wire/region.h"
+#include "wire/unix_socket.h"
 
 namespace facetwise {
 namespace {
@@ -53,10 +53,7 @@ class Shared : public ::testing::Test {
   }
   // What the server says to an offer; nothing where it ends the connection.
   std::optional<std::string> offer(const wire::RegionOffer& offer, int file) const {
-    const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
-    wire::region_path(folder_.path("s")).copy(where.sun_path, sizeof where.sun_path - 1);
-    EXPECT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&where), sizeof where), 0);
+    const int socket = wire::connect_unix(wire::region_path(folder_.path("s")));
     EXPECT_TRUE(wire::send_offer(socket, offer, file).ok());
     wire::RegionAnswer answer;
     const bool answered = recv(socket, &answer, sizeof answer, MSG_WAITALL) == sizeof answer;
@@ -294,11 +291,8 @@ TEST_F(Shared, OfClientsThatDieNothingStays) {
   if (client == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     // Without gRPC, which does not survive a fork: the offer alone.
-    const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);
-    sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
-    wire::region_path(folder_.path("s")).copy(where.sun_path, sizeof where.sun_path - 1);
-    char byte = ::connect(socket, reinterpret_cast<const sockaddr*>(&where), sizeof where) == 0 &&
-                        wire::send_offer(socket, {.id = 7, .bytes = memory_->bytes()}, memory_->file()).ok() &&
+    const int socket = wire::connect_unix(wire::region_path(folder_.path("s")));
+    char byte = socket >= 0 && wire::send_offer(socket, {.id = 7, .bytes = memory_->bytes()}, memory_->file()).ok() &&
                         recv(socket, &byte, 1, 0) == 1
                     ? 'y'
                     : 'n';

@@ -2,9 +2,10 @@
 #include "support/lobe.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+
+#include "facetwise/gauss.h"
 
 namespace facetwise::test {
 namespace {
@@ -12,38 +13,6 @@ namespace {
 using reference::Vector;
 
 constexpr double kHalfPi = std::numbers::pi / 2, kTwoPi = 2 * std::numbers::pi;
-
-// Gauss-Legendre nodes and weights on [-1, 1], by Newton's method on the Legendre polynomial.
-template <int N>
-struct Gauss {
-  std::array<double, N> x, w;
-  Gauss() {
-    for (int k = 0; k < N; ++k) {
-      double z = std::cos(std::numbers::pi * (k + 0.75) / (N + 0.5)), derivative = 1;
-      for (int step = 0; step < 50; ++step) {
-        double p = 1, before = 0;
-        for (int n = 1; n <= N; ++n) {
-          const double next = ((2 * n - 1) * z * p - (n - 1) * before) / n;
-          before = p;
-          p = next;
-        }
-        derivative = N * (z * p - before) / (z * z - 1);
-        z -= p / derivative;
-      }
-      x[k] = z;
-      w[k] = 2 / ((1 - z * z) * derivative * derivative);
-    }
-  }
-};
-
-const Gauss<6>& inner_rule() {
-  static const Gauss<6> rule;
-  return rule;
-}
-const Gauss<8>& outer_rule() {
-  static const Gauss<8> rule;
-  return rule;
-}
 
 // The part of the meridian phi that belongs to the lobe is one interval [low, high] of t. In x = tan t, with
 // w = alpha_x i_x cos phi + alpha_y i_y sin phi and a = (alpha_x cos phi)^2 + (alpha_y sin phi)^2,
@@ -84,11 +53,11 @@ double value_at(const Lobe& lobe, const Integrand& integrand, double t, double p
 
 // The integral over t in [low, high] at one phi.
 double along(const Lobe& lobe, const Integrand& integrand, double low, double high, double phi) {
-  const auto& rule = inner_rule();
+  static const GaussRule rule = gauss_rule(6);
   double sum = 0;
-  for (std::size_t n = 0; n < rule.x.size(); ++n)
-    sum += rule.w[n] * value_at(lobe, integrand, (low + high) / 2 + (high - low) / 2 * rule.x[n], phi);
-  return sum * (high - low) / 2;
+  for (std::size_t n = 0; n < rule.point.size(); ++n)
+    sum += rule.weight[n] * value_at(lobe, integrand, low + (high - low) * rule.point[n], phi);
+  return sum * (high - low);
 }
 
 double along_adaptive(const Lobe& lobe, const Integrand& integrand, double low, double high, double phi, double whole,
@@ -104,16 +73,16 @@ double along_adaptive(const Lobe& lobe, const Integrand& integrand, double low, 
 void strip(const Lobe& lobe, const Grid& grid, const Integrand& integrand, double a, double b, double tolerance_t,
            std::vector<double>& sums) {
   std::fill(sums.begin(), sums.end(), 0.0);
-  const auto& outer = outer_rule();
-  for (std::size_t k = 0; k < outer.x.size(); ++k) {
-    const double phi = (a + b) / 2 + (b - a) / 2 * outer.x[k];
+  static const GaussRule outer = gauss_rule(8);
+  for (std::size_t k = 0; k < outer.point.size(); ++k) {
+    const double phi = a + (b - a) * outer.point[k];
     const Interval part = meridian(lobe, phi);
     for (std::size_t cell = 0; cell + 1 < grid.t.size(); ++cell) {
       const double low = std::max(grid.t[cell], part.low), high = std::min(grid.t[cell + 1], part.high);
       if (!(low < high)) continue;
       double sum = along(lobe, integrand, low, high, phi);
       if (tolerance_t > 0) sum = along_adaptive(lobe, integrand, low, high, phi, sum, tolerance_t, 30);
-      sums[cell] += sum * outer.w[k] * (b - a) / 2;
+      sums[cell] += sum * outer.weight[k] * (b - a);
     }
   }
 }

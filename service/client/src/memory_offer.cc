@@ -3,16 +3,15 @@
 
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "wire/region.h"
+#include "wire/unix_socket.h"
 
 namespace facetwise {
 namespace {
@@ -40,22 +39,15 @@ absl::Status MemoryOffer::make() {
   // Nothing comes on it but its end.
   if (pollfd stands = {socket_, POLLIN, 0}; socket_ >= 0 && poll(&stands, 1, 0) == 0) return absl::OkStatus();
   if (socket_ >= 0) close(std::exchange(socket_, -1));
-  sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
-  if (path_.size() >= sizeof where.sun_path)
+  if (path_.size() > wire::kLongestUnixPath)
     return absl::InvalidArgumentError(absl::StrCat(path_, ": too long a path"));
-  std::copy(path_.begin(), path_.end(), where.sun_path);
-  const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (socket < 0) return absl::UnavailableError(std::strerror(errno));
+  const int socket = wire::connect_unix(path_);
+  if (socket < 0) return absl::UnavailableError(absl::StrCat(path_, ": ", std::strerror(errno)));
   setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
-  absl::Status status;
   wire::RegionAnswer answer;
-  if (::connect(socket, reinterpret_cast<const sockaddr*>(&where), sizeof where) != 0) {
-    status = absl::UnavailableError(absl::StrCat(path_, ": ", std::strerror(errno)));
-  } else {
-    status = wire::send_offer(socket, {.id = memory_->id(), .bytes = memory_->bytes()}, memory_->file());
-    if (status.ok() && recv(socket, &answer, sizeof answer, MSG_WAITALL) != sizeof answer)
-      status = absl::UnavailableError(absl::StrCat(path_, ": no answer"));
-  }
+  absl::Status status = wire::send_offer(socket, {.id = memory_->id(), .bytes = memory_->bytes()}, memory_->file());
+  if (status.ok() && recv(socket, &answer, sizeof answer, MSG_WAITALL) != sizeof answer)
+    status = absl::UnavailableError(absl::StrCat(path_, ": no answer"));
   if (status.ok() && answer.refusal[0] != 0) {
     answer.refusal[sizeof answer.refusal - 1] = 0;
     status = absl::PermissionDeniedError(absl::StrCat("does not take the shared memory: ", answer.refusal));

@@ -7,7 +7,6 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "wire/unix_socket.h"
 
 namespace facetwise {
 namespace {
@@ -45,9 +45,9 @@ absl::Status check_address(const std::string& address, bool anywhere) {
   };
   if (address.starts_with(kUnix)) {
     const std::string path = unix_path(address);
-    constexpr std::size_t kLongest = sizeof(sockaddr_un::sun_path) - 1;
     if (path.empty()) return invalid("has no path: write unix:PATH");
-    if (path.size() > kLongest) return invalid(absl::StrCat("is too long a path: ", kLongest, " bytes at most"));
+    if (path.size() > wire::kLongestUnixPath)
+      return invalid(absl::StrCat("is too long a path: ", wire::kLongestUnixPath, " bytes at most"));
     return absl::OkStatus();
   }
   const auto colon = address.rfind(':');
@@ -92,8 +92,7 @@ absl::StatusOr<Listening> listen_on(const std::string& address, unsigned unix_mo
   };
   Listening listening{.sockets = {}, .address = address};
   if (const std::string path = unix_path(address); !path.empty()) {
-    sockaddr_un where = {.sun_family = AF_UNIX, .sun_path = {}};
-    std::strncpy(where.sun_path, path.c_str(), sizeof where.sun_path - 1);
+    const sockaddr_un where = wire::unix_address(path);
     Socket socket(::socket(AF_UNIX, kFlags, 0));
     if (socket.file() < 0 || bind(socket.file(), reinterpret_cast<const sockaddr*>(&where), sizeof where) != 0 ||
         chmod(path.c_str(), unix_mode) != 0 || listen(socket.file(), kBacklog) != 0)
