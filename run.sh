@@ -14,13 +14,15 @@ On a Debian 12 machine, from nothing to a measured result:
   3. starts `facetwise serve` in its own process, on a Unix socket;
   4. sends it batches of 1,048,576 lanes of every model, traced with Embree at a mesh, recomputes every answer here and
      compares every byte (`facetwise verify`);
-  5. runs a short benchmark, scalar, SIMD, threads and remote (`facetwise bench`);
-  6. runs the texts' experiments, small (`facetwise experiment --quick`);
-  7. prints a summary and makes a page of it all.
+  5. tries the properties that a BSDF should have on its answers (`facetwise prove`);
+  6. runs a short benchmark, scalar, SIMD, threads and remote (`facetwise bench`);
+  7. runs the texts' experiments, small (`facetwise experiment --quick`);
+  8. prints a summary and makes a page of it all.
 
 Writes  out/report.html  the page, for a browser
         out/report.json  the benchmark's results
         out/verify.json  the comparison, batch by batch
+        out/proof.html   what of a BSDF was tried, with pictures
         out/experiments  the experiments, a page each as JSON
         out/*.log        what each step printed
 Exit code: 0 if every byte is equal and every step worked.
@@ -81,6 +83,8 @@ done
 say "verify: batches of traced rays against the server"
 rm -f out/verify.json out/report.json
 logged verify "$facetwise" verify --remote "$address" --json out/verify.json
+say "prove: what a BSDF should keep, by the server's exact reflections (out/proof.html)"
+logged prove "$facetwise" prove "$address" --sampler exact --page out/proof.html
 say "benchmark: a minute and a half (out/bench.log)"
 logged bench "$facetwise" bench --quick --remote "$address" --json out/report.json
 say "experiments: three minutes (out/experiments.log)"
@@ -94,4 +98,5 @@ echo
 "$facetwise" summary --report out/report.json --verification out/verify.json
 echo
 echo "Look at it: out/report.html. Results: out/report.json, out/verify.json. Full tables: out/bench.log."
+echo "The properties that hold of exact reflections, with pictures: out/proof.html."
 echo "The experiments' claims, measured: out/experiments.log; in full: facetwise experiment (about 40 minutes)."
