@@ -8,7 +8,11 @@
 
 #include "facetwise/albedo_table.h"
 #include "facetwise/batch.h"
+#include "facetwise/shared_memory.h"
 #include "src/answer.h"
+#include "src/listen.h"
+#include "wire/region.h"
+#include "wire/unix_socket.h"
 
 namespace facetwise::fuzz {
 
@@ -30,13 +34,33 @@ inline void make_albedo_tables() {
     }
 }
 
+// Memory that a client shares, named 7 in the corpus: handed over as a client does.
+inline const SharedRegions& regions(Log& log) {
+  static SharedRegions regions(std::size_t{1} << 20, {}, log);
+  static const bool ready = [] {
+    char folder[] = "/tmp/facetwise-fuzz-XXXXXX";
+    const std::string path = std::string(mkdtemp(folder)) + "/memory";
+    regions.listen(std::move(listen_on("unix:" + path, 0600)->sockets));
+    static const auto memory = *SharedMemory::make(kMessageBytes);
+    const int socket = wire::connect_unix(path);
+    wire::RegionAnswer answer;
+    if (!wire::send_offer(socket, {.id = 7, .bytes = memory->bytes()}, memory->file()).ok() ||
+        recv(socket, &answer, sizeof answer, MSG_WAITALL) != sizeof answer || answer.refusal[0] != 0)
+      std::abort();
+    unlink(path.c_str());
+    rmdir(folder);
+    return true;
+  }();
+  if (!ready) std::abort();
+  return regions;
+}
+
 template <class Answer>
 void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   static Compute compute(1, {});
   static Tables tables(0, {});
   static Metrics metrics({}, [] { return v1::ServerLoad(); });
   static Log log(LogFormat::none, LogLevel::warning);
-  static const SharedRegions regions(0, {}, log);
   static const std::atomic<bool> stop{false};
   static Admission admission({8, 8, 64 * kMessageBytes, kMessageBytes, std::chrono::milliseconds(1000)});
   static const bool ready = [] {
@@ -54,7 +78,7 @@ void answer(Answer answer, const std::uint8_t* data, std::size_t size) {
   Admission::Stay stay(
       admission, [] {}, "");
   CallFacts facts;
-  const CallTools tools{{kMessageBytes}, compute, tables, regions, stay, stop, metrics, facts};
+  const CallTools tools{{kMessageBytes}, compute, tables, regions(log), stay, stop, metrics, facts};
   const auto answered = wait_for(answer(request, tools));
   // What is too much or malformed is refused; nothing else goes wrong.
   if (!answered.ok() && answered.status().code() != absl::StatusCode::kInvalidArgument &&
