@@ -22,6 +22,7 @@ constexpr const char* kHost = R"(
 import importlib, importlib.util, os, socket, struct, sys
 import numpy as np
 os.dup2(2, 1)
+sys.dont_write_bytecode = True  # what is beside the module is the user's, and may be of another text of the same second
 ask = socket.socket(fileno=3).makefile("rwb")
 place = sys.argv[1]
 if place.endswith(".py"):
