@@ -63,7 +63,7 @@ def main():
     programs = sorted({program for mistake in chosen for program in mistake[4]})
     print(f"{len(chosen)} mistakes; building {', '.join(programs)} in {arguments.folder}", flush=True)
     configured = run("cmake", "-S", arguments.folder, "-B", os.path.join(arguments.folder, "build"), "-G", "Ninja",
-                     "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG -march=haswell",
+                     "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG -march=haswell -D_GLIBCXX_ASSERTIONS",
                      "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
     built = build(arguments.folder, programs)
     if configured.returncode or built.returncode:
