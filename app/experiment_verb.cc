@@ -57,10 +57,7 @@ struct ExperimentVerb {
     if (quick) page->command += " --quick";
     if (paper) page->command += " --paper";
     const std::string path = fmt::format("{}/{}.json", folder, experiment.id);
-    auto file = OutputFile::create(path);
-    if (!file.ok()) return file.status();
-    if (auto status = file->write(experiments::page_json(*page)); !status.ok()) return status;
-    if (auto status = file->commit(); !status.ok()) return status;
+    if (auto status = write_file(path, experiments::page_json(*page)); !status.ok()) return status;
     fmt::print("{}: {} ({:.0f} s, {})\n", page->id, page->title, page->seconds, path);
     for (const auto& claim : page->claims)
       fmt::print("  {}\n    {}: {}\n", claim.says, name(claim.verdict), claim.measured);

@@ -15,14 +15,6 @@
 namespace facetwise::app {
 namespace {
 
-absl::Status write(const std::string& path, const std::string& text) {
-  if (path.empty()) return absl::OkStatus();
-  auto file = OutputFile::create(path);
-  if (!file.ok()) return file.status();
-  if (auto status = file->write(text); !status.ok()) return status;
-  return file->commit();
-}
-
 struct ProveVerb {
   std::string what, python = "python3", page, json;
   std::vector<double> theta{0, 30, 60, 85}, alpha{0.1, 0.1, 0.1, 0.5, 0.3, 0.3, 1, 1};  // alpha in pairs
@@ -64,21 +56,21 @@ struct ProveVerb {
     if (!proof.ok()) return fail("prove", proof.status());
 
     fmt::print("{}: {} configurations, {} samples each\n", proof->bsdf, proof->examined.size(), proof->samples);
-    for (int p = 0; p < prove::kProperties; ++p) {
-      const auto property = static_cast<prove::Property>(p);
+    for (const prove::Property property : prove::all_properties()) {
       const auto summary = proof->summary(property);
       if (summary.worst == nullptr) continue;
       fmt::print("  {:<13} {:<6} {}", prove::name(property), summary.failed > 0 ? "FAILS" : "holds",
                  summary.failed > 0 ? fmt::format("in {} of {}; worst: ", summary.failed, summary.tried) : "");
       fmt::print("{}", summary.worst->what);
-      if (summary.at != nullptr)
-        fmt::print(" (theta {}, alpha {:g}, {:g})", summary.at->theta, summary.at->alpha_x, summary.at->alpha_y);
+      if (summary.at != nullptr) fmt::print(" ({})", prove::label(*summary.at));
       fmt::print("\n");
       if (summary.failed > 0 && !summary.worst->where.empty()) fmt::print("{:23}{}\n", "", summary.worst->where);
     }
     fmt::print("result: {}\n", proof->holds() ? "every property holds" : "it FAILS");
-    if (auto status = write(json, prove::to_json(*proof)); !status.ok()) return fail("prove", status);
-    if (auto status = write(page, prove::page(*proof)); !status.ok()) return fail("prove", status);
+    if (!json.empty())
+      if (auto status = write_file(json, prove::to_json(*proof)); !status.ok()) return fail("prove", status);
+    if (!page.empty())
+      if (auto status = write_file(page, prove::page(*proof)); !status.ok()) return fail("prove", status);
     return proof->holds() ? kDone : kFailed;
   }
 };
@@ -89,9 +81,8 @@ Verb add_prove(CLI::App& app) {
   auto arguments = std::make_shared<ProveVerb>();
   CLI::App& command = *app.add_subcommand("prove", "Try the properties that a BSDF should have on somebody else's");
   std::string properties;
-  for (int p = 0; p < prove::kProperties; ++p)
-    properties += fmt::format("  {:<13} {}\n", prove::name(static_cast<prove::Property>(p)),
-                              prove::meaning(static_cast<prove::Property>(p)));
+  for (const prove::Property property : prove::all_properties())
+    properties += fmt::format("  {:<13} {}\n", prove::name(property), prove::meaning(property));
   command.footer(fmt::format(R"(BSDF is one of
   FILE.so          a shared library with fw_plugin_open() (facetwise_plugin.h)
   python:MODULE    a Python module or file with sample(i, alpha, u) -> (o, pdf, weight) and

@@ -31,10 +31,7 @@ struct ReportVerb {
   absl::Status try_run() const {
     const auto page = compared.empty() ? report::page(inputs()) : report::comparison(compared[0], compared[1]);
     if (!page.ok()) return page.status();
-    auto file = OutputFile::create(output);
-    if (!file.ok()) return file.status();
-    if (auto status = file->write(*page); !status.ok()) return status;
-    if (auto status = file->commit(); !status.ok()) return status;
+    if (auto status = write_file(output, *page); !status.ok()) return status;
     fmt::print("{}: {:.1f} MB, for any browser\n", output, 1e-6 * static_cast<double>(page->size()));
     return absl::OkStatus();
   }

@@ -185,13 +185,9 @@ struct VerifyVerb {
     });
     if (!verification.ok()) return fail("verify", verification.status());
     print(*verification, mesh);
-    if (!json.empty()) {
-      auto file = OutputFile::create(json);
-      if (!file.ok()) return fail("verify", file.status());
-      if (auto status = file->write(to_json(*verification, mesh, engine).dump(1) + "\n"); !status.ok())
+    if (!json.empty())
+      if (auto status = write_file(json, to_json(*verification, mesh, engine).dump(1) + "\n"); !status.ok())
         return fail("verify", status);
-      if (auto status = file->commit(); !status.ok()) return fail("verify", status);
-    }
     return verification->equal() ? kDone : kFailed;
   }
 };

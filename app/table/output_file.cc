@@ -71,4 +71,11 @@ absl::Status OutputFile::commit() {
   return absl::OkStatus();
 }
 
+absl::Status write_file(const std::string& path, std::string_view bytes) {
+  auto file = OutputFile::create(path);
+  if (!file.ok()) return file.status();
+  if (auto status = file->write(bytes); !status.ok()) return status;
+  return file->commit();
+}
+
 }  // namespace facetwise::app

@@ -28,6 +28,9 @@ class OutputFile {
   int descriptor_ = -1;
 };
 
+// A file of these bytes, complete or not at all.
+absl::Status write_file(const std::string& path, std::string_view bytes);
+
 // Writes all of `bytes` to a descriptor. `what` begins the error.
 absl::Status write_all(int descriptor, std::string_view bytes, const std::string& what);
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/format.h>
-
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/str_replace.h"
@@ -116,14 +115,9 @@ Json json_of(const Finding& f) {
   return json;
 }
 
-std::string label(const Configuration& c) {
-  return fmt::format("theta {}, alpha {:g}, {:g}", c.theta, c.alpha_x, c.alpha_y);
-}
-
 Json json_of(const Proof& proof, bool with_pictures) {
   Json json = {{"bsdf", proof.bsdf}, {"holds", proof.holds()}, {"samples", proof.samples}};
-  for (int p = 0; p < kProperties; ++p) {
-    const auto property = static_cast<Property>(p);
+  for (const Property property : all_properties()) {
     const Proof::Summary summary = proof.summary(property);
     if (summary.worst == nullptr) continue;
     Json entry = {{"name", name(property)},

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -334,7 +335,7 @@ absl::StatusOr<Finding> hostile(Bsdf& bsdf, Property property, const Hostile& la
 struct Described {
   std::string_view name, meaning;
 };
-constexpr Described kDescribed[kProperties] = {
+constexpr Described kDescribed[] = {
     {"numbers", "every number is finite and none negative, at grazing and normal incidence and at the ends of u"},
     {"garbage", "the same where the inputs are no directions or roughness at all"},
     {"directions", "what is drawn has unit length"},
@@ -358,6 +359,19 @@ double badness(const Finding& f) {
 
 std::string_view name(Property property) { return kDescribed[static_cast<int>(property)].name; }
 std::string_view meaning(Property property) { return kDescribed[static_cast<int>(property)].meaning; }
+
+std::span<const Property> all_properties() {
+  static const auto all = [] {
+    std::array<Property, std::size(kDescribed)> some{};
+    for (std::size_t k = 0; k < some.size(); ++k) some[k] = static_cast<Property>(k);
+    return some;
+  }();
+  return all;
+}
+
+std::string label(const Configuration& c) {
+  return fmt::format("theta {}, alpha {:g}, {:g}", c.theta, c.alpha_x, c.alpha_y);
+}
 
 bool Proof::holds() const {
   const auto right = [](const Finding& f) { return f.holds; };

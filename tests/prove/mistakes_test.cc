@@ -102,12 +102,12 @@ std::set<Property> broken(Bsdf& bsdf) {
   EXPECT_TRUE(proof.ok()) << proof.status();
   std::set<Property> failed;
   if (!proof.ok()) return failed;
-  for (int p = 0; p < kProperties; ++p) {
-    const auto summary = proof->summary(static_cast<Property>(p));
-    EXPECT_GT(summary.tried, 0) << p;
-    if (summary.failed > 0) failed.insert(static_cast<Property>(p));
-    if (summary.failed > 0)
-      std::printf("  %s: %s\n", std::string(name(static_cast<Property>(p))).c_str(), summary.worst->what.c_str());
+  for (const Property property : all_properties()) {
+    const auto summary = proof->summary(property);
+    EXPECT_GT(summary.tried, 0) << name(property);
+    if (summary.failed == 0) continue;
+    failed.insert(property);
+    std::printf("  %s: %s\n", std::string(name(property)).c_str(), summary.worst->what.c_str());
   }
   EXPECT_EQ(proof->holds(), failed.empty());
   return failed;

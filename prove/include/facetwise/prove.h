@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,7 +25,7 @@ enum class Property : std::uint8_t {
   energy,        // no more light leaves than arrives
   reciprocity,   // f(i, o) = f(o, i), of reflections
 };
-inline constexpr int kProperties = 10;
+std::span<const Property> all_properties();
 std::string_view name(Property property);
 std::string_view meaning(Property property);  // one sentence
 
@@ -32,6 +33,7 @@ struct Configuration {
   double theta = 0, phi = 0;  // of i, degrees
   float alpha_x = 0, alpha_y = 0;
 };
+std::string label(const Configuration& configuration);  // "theta 60, alpha 0.3, 0.3"
 
 // What came out for one property in one configuration.
 struct Finding {
